@@ -1,0 +1,210 @@
+//! Builder of deformable bodies, after rapier's own builders.
+
+use super::body::{BodyError, DeformableBody};
+use super::model::DeformableModel;
+use super::settings::SolverSettings;
+use crate::error::DeformableBodyError;
+use crate::material::DeformableMaterial;
+use crate::mesh::{MeshError, TetMesh};
+use parry3d::shape::Shape;
+use rapier3d::dynamics::CoefficientCombineRule;
+use rapier3d::geometry::InteractionGroups;
+use rapier3d::math::{Pose, Rotation, Vector};
+use std::sync::Arc;
+
+/// Builds a [`DeformableBody`]. Errors of the mesh are kept until [`DeformableBodyBuilder::build`],
+/// so that setters chain.
+///
+/// ```
+/// use foible3d::prelude::*;
+/// use rapier3d::prelude::*;
+/// let body = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [6, 6, 6])
+///     .translation(Vector::Y)
+///     .material(DeformableMaterial::new(1.0e6, 0.3))
+///     .pinned(|x| x.y > 1.199)
+///     .build()?;
+/// assert_eq!(body.pinned().len(), 7 * 7);
+/// # Ok::<(), DeformableBodyError>(())
+/// ```
+#[derive(Clone)]
+#[must_use = "a builder does nothing until it is inserted or built"]
+pub struct DeformableBodyBuilder {
+    model: Result<Arc<DeformableModel>, MeshError>,
+    material: DeformableMaterial,
+    settings: SolverSettings,
+    pose: Pose,
+    linvel: Vector,
+    angvel: Vector,
+    pinned: Option<Condition>,
+    gravity_scale: f64,
+    enabled: bool,
+    collision_groups: InteractionGroups,
+    friction_combine_rule: CoefficientCombineRule,
+    restitution_combine_rule: CoefficientCombineRule,
+    user_data: u128,
+}
+
+type Condition = Arc<dyn Fn(Vector) -> bool + Send + Sync>;
+
+impl DeformableBodyBuilder {
+    /// A cuboid of these half extents [m], cut into cells of five tetrahedra each.
+    pub fn cuboid(half_extents: Vector, cells: [usize; 3]) -> Self {
+        Self::from_mesh(TetMesh::cuboid(half_extents.to_array().map(f64::from), cells))
+    }
+
+    /// A parry shape filled with tetrahedra of about `cell_size` [m], see [`TetMesh::fill_shape`].
+    pub fn filled(shape: &dyn Shape, cell_size: f32) -> Self {
+        Self::from_mesh(TetMesh::fill_shape(shape, cell_size))
+    }
+
+    /// A Gmsh file, see [`TetMesh::read_gmsh`].
+    #[cfg(feature = "gmsh")]
+    pub fn gmsh(path: impl AsRef<std::path::Path>) -> Self {
+        Self::from_mesh(TetMesh::read_gmsh(path))
+    }
+
+    /// Any mesh.
+    pub fn mesh(mesh: &TetMesh) -> Self {
+        Self::new(Ok(Arc::new(DeformableModel::new(mesh))))
+    }
+
+    /// A model that other bodies have already: they share their factors too.
+    pub fn model(model: Arc<DeformableModel>) -> Self {
+        Self::new(Ok(model))
+    }
+
+    fn from_mesh(mesh: Result<TetMesh, MeshError>) -> Self {
+        Self::new(mesh.map(|mesh| Arc::new(DeformableModel::new(&mesh))))
+    }
+
+    fn new(model: Result<Arc<DeformableModel>, MeshError>) -> Self {
+        Self {
+            model,
+            material: DeformableMaterial::new(1.0e6, 0.3),
+            settings: SolverSettings::default(),
+            pose: Pose::IDENTITY,
+            linvel: Vector::ZERO,
+            angvel: Vector::ZERO,
+            pinned: None,
+            gravity_scale: 1.0,
+            enabled: true,
+            collision_groups: InteractionGroups::all(),
+            friction_combine_rule: CoefficientCombineRule::Average,
+            restitution_combine_rule: CoefficientCombineRule::Average,
+            user_data: 0,
+        }
+    }
+
+    /// Sets the material.
+    pub fn material(mut self, material: DeformableMaterial) -> Self {
+        self.material = material;
+        self
+    }
+
+    /// Sets the knobs of the solver.
+    pub fn settings(mut self, settings: SolverSettings) -> Self {
+        self.settings = settings;
+        self
+    }
+
+    /// Sets the translation [m] of the rest mesh into the world.
+    pub fn translation(mut self, translation: Vector) -> Self {
+        self.pose.translation = translation;
+        self
+    }
+
+    /// Sets the rotation of the rest mesh into the world, as axis times angle [rad].
+    pub fn rotation(mut self, angle: Vector) -> Self {
+        self.pose.rotation = Rotation::from_scaled_axis(angle);
+        self
+    }
+
+    /// Sets the pose of the rest mesh in the world.
+    pub fn pose(mut self, pose: Pose) -> Self {
+        self.pose = pose;
+        self
+    }
+
+    /// Sets the initial velocity of the centre of mass [m/s].
+    pub fn linvel(mut self, linvel: Vector) -> Self {
+        self.linvel = linvel;
+        self
+    }
+
+    /// Sets the initial angular velocity [rad/s].
+    pub fn angvel(mut self, angvel: Vector) -> Self {
+        self.angvel = angvel;
+        self
+    }
+
+    /// Pins the vertices whose initial position in the world satisfies a condition.
+    pub fn pinned(mut self, condition: impl Fn(Vector) -> bool + Send + Sync + 'static) -> Self {
+        self.pinned = Some(Arc::new(condition));
+        self
+    }
+
+    /// Sets the factor on gravity.
+    pub fn gravity_scale(mut self, scale: f64) -> Self {
+        self.gravity_scale = scale;
+        self
+    }
+
+    /// Sets whether the body takes part in the simulation.
+    pub fn enabled(mut self, enabled: bool) -> Self {
+        self.enabled = enabled;
+        self
+    }
+
+    /// Sets which colliders the body collides with.
+    pub fn collision_groups(mut self, groups: InteractionGroups) -> Self {
+        self.collision_groups = groups;
+        self
+    }
+
+    /// Sets how friction combines with a collider's.
+    pub fn friction_combine_rule(mut self, rule: CoefficientCombineRule) -> Self {
+        self.friction_combine_rule = rule;
+        self
+    }
+
+    /// Sets how restitution combines with a collider's.
+    pub fn restitution_combine_rule(mut self, rule: CoefficientCombineRule) -> Self {
+        self.restitution_combine_rule = rule;
+        self
+    }
+
+    /// Sets the user's data.
+    pub fn user_data(mut self, data: u128) -> Self {
+        self.user_data = data;
+        self
+    }
+
+    /// Makes the body.
+    ///
+    /// # Errors
+    /// What is wrong with the mesh or the material, or a pose or velocity that is not finite.
+    pub fn build(&self) -> Result<DeformableBody, DeformableBodyError> {
+        self.material.validate()?;
+        if !self.gravity_scale.is_finite() {
+            let value = Vector::splat(self.gravity_scale as f32);
+            let quantity = "gravity scale";
+            return Err(BodyError::NotFinite { quantity, value }.into());
+        }
+        let mut body = DeformableBody::new(self.model.clone()?, self.material);
+        body.teleport(self.pose)?;
+        body.set_vels(self.linvel, self.angvel)?;
+        body.set_settings(self.settings);
+        body.set_gravity_scale(self.gravity_scale);
+        body.set_enabled(self.enabled);
+        body.set_collision_groups(self.collision_groups);
+        body.set_friction_combine_rule(self.friction_combine_rule);
+        body.set_restitution_combine_rule(self.restitution_combine_rule);
+        body.user_data = self.user_data;
+        if let Some(condition) = &self.pinned {
+            for vertex in body.vertices_where(|x| condition(x)) {
+                body.pin(vertex)?;
+            }
+        }
+        Ok(body)
+    }
+}

@@ -1,0 +1,22 @@
+//! Deformable bodies: what is constant ([`DeformableModel`]), what a snapshot holds
+//! ([`DeformableState`]), and what a user sets ([`DeformableBody`]).
+//!
+//! Architecture invariant: vertex indices at the surface of this module are the user's; inside,
+//! nodes are renumbered for locality, and only `DeformableModel` translates.
+
+mod builder;
+#[allow(clippy::module_inception)]
+mod body;
+pub(crate) mod elastic;
+mod model;
+mod set;
+mod settings;
+mod state;
+
+pub use body::{BodyError, DeformableBody, Pin};
+pub use builder::DeformableBodyBuilder;
+pub use model::DeformableModel;
+pub use set::{DeformableBodyHandle, DeformableBodySet};
+pub use settings::{Acceleration, Frames, SolverSettings, SystemMatrix};
+pub use state::DeformableState;
+pub(crate) use state::{ContactKey, ContactMemory};

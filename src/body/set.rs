@@ -1,0 +1,107 @@
+//! The set of all bodies of a world.
+
+use super::body::DeformableBody;
+use super::builder::DeformableBodyBuilder;
+use crate::error::{DeformableBodyError, HandleError};
+use rapier3d::data::arena::{Arena, Index};
+use std::ops::{Index as At, IndexMut as AtMut};
+
+/// Names a body of a [`DeformableBodySet`]. Generational: a handle of a removed body never names
+/// its successor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct DeformableBodyHandle(Index);
+
+impl DeformableBodyHandle {
+    /// Slot and generation.
+    pub fn into_raw_parts(self) -> (u32, u32) {
+        self.0.into_raw_parts()
+    }
+
+    pub(crate) fn no_such_body(self) -> HandleError {
+        let (index, generation) = self.into_raw_parts();
+        HandleError::NoSuchBody { index, generation }
+    }
+}
+
+/// All deformable bodies of a world.
+#[derive(Clone, Debug, Default)]
+pub struct DeformableBodySet {
+    bodies: Arena<DeformableBody>,
+}
+
+impl DeformableBodySet {
+    /// An empty set.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Builds a body and takes it in.
+    ///
+    /// # Errors
+    /// As [`DeformableBodyBuilder::build`]; the set stays as it was then.
+    pub fn insert(
+        &mut self,
+        builder: DeformableBodyBuilder,
+    ) -> Result<DeformableBodyHandle, DeformableBodyError> {
+        Ok(self.insert_body(builder.build()?))
+    }
+
+    /// Takes a body in.
+    pub fn insert_body(&mut self, body: DeformableBody) -> DeformableBodyHandle {
+        DeformableBodyHandle(self.bodies.insert(body))
+    }
+
+    /// Takes a body out.
+    ///
+    /// # Errors
+    /// [`HandleError::NoSuchBody`].
+    pub fn remove(&mut self, handle: DeformableBodyHandle) -> Result<DeformableBody, DeformableBodyError> {
+        let body = self.bodies.remove(handle.0);
+        body.ok_or_else(|| handle.no_such_body().into())
+    }
+
+    /// The body of a handle.
+    pub fn get(&self, handle: DeformableBodyHandle) -> Option<&DeformableBody> {
+        self.bodies.get(handle.0)
+    }
+
+    /// The body of a handle, to be changed.
+    pub fn get_mut(&mut self, handle: DeformableBodyHandle) -> Option<&mut DeformableBody> {
+        self.bodies.get_mut(handle.0)
+    }
+
+    /// All bodies, in the order of their slots.
+    pub fn iter(&self) -> impl Iterator<Item = (DeformableBodyHandle, &DeformableBody)> {
+        self.bodies.iter().map(|(i, b)| (DeformableBodyHandle(i), b))
+    }
+
+    /// All bodies, to be changed.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = (DeformableBodyHandle, &mut DeformableBody)> {
+        self.bodies.iter_mut().map(|(i, b)| (DeformableBodyHandle(i), b))
+    }
+
+    /// Number of bodies.
+    pub fn len(&self) -> usize {
+        self.bodies.len()
+    }
+
+    /// Whether there are no bodies.
+    pub fn is_empty(&self) -> bool {
+        self.bodies.is_empty()
+    }
+}
+
+impl At<DeformableBodyHandle> for DeformableBodySet {
+    type Output = DeformableBody;
+    /// # Panics
+    /// If there is no such body; [`DeformableBodySet::get`] does not.
+    fn index(&self, handle: DeformableBodyHandle) -> &DeformableBody {
+        &self.bodies[handle.0]
+    }
+}
+
+impl AtMut<DeformableBodyHandle> for DeformableBodySet {
+    fn index_mut(&mut self, handle: DeformableBodyHandle) -> &mut DeformableBody {
+        &mut self.bodies[handle.0]
+    }
+}

@@ -1,0 +1,84 @@
+//! The knobs that trade speed for accuracy, per body.
+
+/// The constant matrix of the global step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum SystemMatrix {
+    /// `M/h² + K₀` with the linear stiffness K₀ of the rest shape, 3n×3n, applied in rotating
+    /// [`Frames`]. Right at one to three iterations; the default.
+    #[default]
+    RestStiffness,
+    /// `M/h² + Σ w V GᵀG`, the n×n matrix of classical Projective Dynamics [Bouaziz et al. 2014].
+    /// A ninth of the factor, but resists rotation: stiff bodies turn and bend too slowly unless
+    /// iterated. For previews and very large bodies.
+    Laplacian,
+}
+
+/// In which rotating frames the rest stiffness is applied.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Frames {
+    /// One frame for the body while no element has turned by more than 20° against it, else one
+    /// per node.
+    #[default]
+    Automatic,
+    /// One frame for the whole body: quietest under heavy loads, slow to converge under bending.
+    Floating,
+    /// One frame per node, the mean rotation of its elements [Müller et al. 2002].
+    PerNode,
+}
+
+/// Acceleration of the global iteration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Acceleration {
+    /// The plain iteration.
+    #[default]
+    None,
+    /// Limited-memory BFGS on top of the constant matrix [Liu et al. 2017]; pays from about five
+    /// iterations up.
+    Lbfgs {
+        /// Pairs kept, 1 to 16.
+        window: usize,
+    },
+}
+
+/// How hard a body is solved. The defaults were chosen from measured error-against-time curves, see
+/// the README.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolverSettings {
+    /// The constant matrix.
+    pub system: SystemMatrix,
+    /// Frames of the rest stiffness.
+    pub frames: Frames,
+    /// Global iterations at the most, at least one.
+    pub max_iterations: usize,
+    /// Iterate until the largest residual force is below this fraction of the largest force on a
+    /// node (weight, internal or contact force, whichever is largest).
+    pub tolerance: f64,
+    /// Acceleration.
+    pub acceleration: Acceleration,
+}
+
+impl Default for SolverSettings {
+    fn default() -> Self {
+        Self {
+            system: SystemMatrix::default(),
+            frames: Frames::default(),
+            max_iterations: 8,
+            tolerance: 1.0e-3,
+            acceleration: Acceleration::default(),
+        }
+    }
+}
+
+impl SolverSettings {
+    /// Exactly this many iterations, whatever the residual.
+    pub fn iterations(count: usize) -> Self {
+        Self {
+            max_iterations: count,
+            tolerance: 0.0,
+            ..Self::default()
+        }
+    }
+}

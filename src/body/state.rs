@@ -1,0 +1,48 @@
+//! What changes while a body moves.
+
+use crate::math::Vec3;
+
+/// All that a snapshot of a body has to hold. A body restored from it goes on with the same bits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeformableState {
+    /// Node positions [m].
+    pub(crate) x: Vec<Vec3>,
+    /// Node velocities [m/s].
+    pub(crate) v: Vec<Vec3>,
+    /// Contacts of the last step, ascending by key: warm starts of the next.
+    pub(crate) contacts: Vec<ContactMemory>,
+}
+
+/// Names a contact over several steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct ContactKey {
+    /// The obstacle, as coupling names it.
+    pub obstacle: u64,
+    /// Part of a composite obstacle.
+    pub part: u32,
+    /// Surface feature of the body: nodes first, then edges, then triangles.
+    pub feature: u32,
+}
+
+/// What one contact leaves to the next step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ContactMemory {
+    pub key: ContactKey,
+    /// Force on the body [N], in the world.
+    pub force: Vec3,
+    /// De Saxcé shift μ‖slip‖ [m] over the step, per second of it [m/s].
+    pub shift_rate: f64,
+}
+
+impl DeformableState {
+    pub(crate) fn is_finite(&self) -> bool {
+        let finite = |list: &[Vec3]| list.iter().all(|p| p.iter().all(|c| c.is_finite()));
+        finite(&self.x) && finite(&self.v)
+    }
+
+    /// The contact of the last step with this key.
+    pub(crate) fn contact(&self, key: &ContactKey) -> Option<&ContactMemory> {
+        let place = self.contacts.binary_search_by(|c| c.key.cmp(key));
+        place.ok().map(|i| &self.contacts[i])
+    }
+}

@@ -1,0 +1,173 @@
+//! What a body is made of, in SI units.
+
+use crate::energy::Elasticity;
+use thiserror::Error;
+
+/// What is wrong with a material.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[error("material: {quantity} is {value}, but must be {range}")]
+pub struct MaterialError {
+    /// The quantity that is out of range.
+    pub quantity: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// The values that would be right.
+    pub range: &'static str,
+}
+
+/// Material of a deformable body. What you type is what you get: Young's modulus in pascals,
+/// at any mesh, step and iteration count that the solver's tolerance reaches.
+///
+/// Ranges are checked when a body is inserted or its material changed.
+///
+/// ```
+/// use foible3d::DeformableMaterial;
+/// let silicone = DeformableMaterial::new(5.0e4, 0.45).density(1_070.0).friction(0.8);
+/// assert!(silicone.validate().is_ok());
+/// assert!(DeformableMaterial::new(5.0e4, 0.5).validate().is_err());
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeformableMaterial {
+    /// Young's modulus [Pa].
+    pub youngs_modulus: f64,
+    /// Poisson's ratio [–], 0 up to but without 0.5.
+    pub poisson_ratio: f64,
+    /// Density [kg/m³].
+    pub density: f64,
+    /// Coefficient of friction [–], combined with the collider's by rapier's rules.
+    pub friction: f64,
+    /// Coefficient of restitution [–], combined with the collider's by rapier's rules.
+    pub restitution: f64,
+    /// Mass-proportional (Rayleigh) damping α [1/s]: a drag `−α m v` on every node.
+    pub mass_damping: f64,
+    /// Stiffness-proportional damping β [s]: stress `β` times the co-rotated strain rate times the
+    /// stiffness. Rotation is not damped.
+    pub stiffness_damping: f64,
+    /// The elastic energy.
+    pub elasticity: Elasticity,
+}
+
+/// Lamé parameters μ, λ [Pa].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Lame {
+    pub mu: f64,
+    pub lambda: f64,
+}
+
+impl DeformableMaterial {
+    /// A material of Young's modulus `youngs_modulus` [Pa] and Poisson's ratio `poisson_ratio`; the
+    /// density is that of water, friction 0.5, no restitution and no damping.
+    pub fn new(youngs_modulus: f64, poisson_ratio: f64) -> Self {
+        Self {
+            youngs_modulus,
+            poisson_ratio,
+            density: 1000.0,
+            friction: 0.5,
+            restitution: 0.0,
+            mass_damping: 0.0,
+            stiffness_damping: 0.0,
+            elasticity: Elasticity::default(),
+        }
+    }
+
+    /// Sets the density [kg/m³].
+    pub fn density(mut self, density: f64) -> Self {
+        self.density = density;
+        self
+    }
+
+    /// Sets the coefficient of friction.
+    pub fn friction(mut self, friction: f64) -> Self {
+        self.friction = friction;
+        self
+    }
+
+    /// Sets the coefficient of restitution.
+    pub fn restitution(mut self, restitution: f64) -> Self {
+        self.restitution = restitution;
+        self
+    }
+
+    /// Sets the mass-proportional damping α [1/s].
+    pub fn mass_damping(mut self, alpha: f64) -> Self {
+        self.mass_damping = alpha;
+        self
+    }
+
+    /// Sets the stiffness-proportional damping β [s].
+    pub fn stiffness_damping(mut self, beta: f64) -> Self {
+        self.stiffness_damping = beta;
+        self
+    }
+
+    /// Sets the elastic energy.
+    pub fn elasticity(mut self, elasticity: Elasticity) -> Self {
+        self.elasticity = elasticity;
+        self
+    }
+
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// The first quantity that is out of range, with its value and what would be right.
+    pub fn validate(&self) -> Result<(), MaterialError> {
+        let check = |quantity, value: f64, range, fine: bool| match fine {
+            true => Ok(()),
+            false => Err(MaterialError {
+                quantity,
+                value,
+                range,
+            }),
+        };
+        let positive = |quantity, v: f64| {
+            check(quantity, v, "positive and finite", v.is_finite() && v > 0.0)
+        };
+        let not_negative = |quantity, v: f64| {
+            check(quantity, v, "zero or positive, and finite", v.is_finite() && v >= 0.0)
+        };
+        positive("Young's modulus", self.youngs_modulus)?;
+        let nu = self.poisson_ratio;
+        check("Poisson's ratio", nu, "in [0, 0.4999]", (0.0..=0.4999).contains(&nu))?;
+        positive("density", self.density)?;
+        not_negative("friction", self.friction)?;
+        let e = self.restitution;
+        check("restitution", e, "in [0, 1]", (0.0..=1.0).contains(&e))?;
+        not_negative("mass damping", self.mass_damping)?;
+        not_negative("stiffness damping", self.stiffness_damping)
+    }
+
+    /// μ = E/(2(1+ν)), λ = Eν/((1+ν)(1−2ν)).
+    pub(crate) fn lame(&self) -> Lame {
+        let (e, nu) = (self.youngs_modulus, self.poisson_ratio);
+        Lame {
+            mu: e / (2.0 * (1.0 + nu)),
+            lambda: e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_quantity_out_of_range_is_named_with_its_value() {
+        let good = DeformableMaterial::new(1e6, 0.3);
+        assert_eq!(good.validate(), Ok(()));
+        for (material, quantity) in [
+            (DeformableMaterial::new(0.0, 0.3), "Young's modulus"),
+            (DeformableMaterial::new(f64::NAN, 0.3), "Young's modulus"),
+            (DeformableMaterial::new(1e6, 0.5), "Poisson's ratio"),
+            (DeformableMaterial::new(1e6, -0.1), "Poisson's ratio"),
+            (good.density(0.0), "density"),
+            (good.friction(-0.1), "friction"),
+            (good.restitution(1.1), "restitution"),
+            (good.mass_damping(f64::INFINITY), "mass damping"),
+            (good.stiffness_damping(-1e-9), "stiffness damping"),
+        ] {
+            let error = material.validate().unwrap_err();
+            assert_eq!(error.quantity, quantity);
+            assert!(error.to_string().contains(&error.value.to_string()));
+        }
+    }
+}

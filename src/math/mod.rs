@@ -1,0 +1,105 @@
+//! Scalars, small vectors and matrices, and the kernels on them.
+//!
+//! Everything inside the crate is `f64`; rapier's `f32` types appear only at the surface, through
+//! [`to_real`] and [`from_real`].
+
+pub(crate) mod lanes;
+pub(crate) mod polar;
+
+use rapier3d::math::Vector;
+
+/// A point or vector of the solver.
+pub(crate) type Vec3 = nalgebra::Vector3<f64>;
+/// A 3×3 matrix of the solver.
+pub(crate) type Mat3 = nalgebra::Matrix3<f64>;
+
+/// Widens one of rapier's vectors.
+pub(crate) fn from_real(v: Vector) -> Vec3 {
+    Vec3::new(v.x as f64, v.y as f64, v.z as f64)
+}
+
+/// Rounds to one of rapier's vectors.
+pub(crate) fn to_real(v: &Vec3) -> Vector {
+    Vector::new(v.x as f32, v.y as f32, v.z as f32)
+}
+
+/// The matrix of `v ↦ a × v`.
+pub(crate) fn skew(a: &Vec3) -> Mat3 {
+    Mat3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
+}
+
+/// Two unit vectors that complete the unit vector `n` to a right-handed orthonormal frame
+/// [Duff et al. 2017]. Continuous in `n` except at `n.z = 0⁻`.
+pub(crate) fn tangents(n: &Vec3) -> [Vec3; 2] {
+    let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    [
+        Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
+        Vec3::new(b, sign + n.y * n.y * a, -n.y),
+    ]
+}
+
+/// A rigid motion `x ↦ R x + t` in `f64`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Pose64 {
+    pub rotation: Mat3,
+    pub translation: Vec3,
+}
+
+impl Pose64 {
+    /// Widens rapier's pose; the quaternion is normalised in `f64`, so the matrix is a rotation
+    /// to 1e-16 and not to 1e-7.
+    pub fn from_real(pose: &rapier3d::math::Pose) -> Self {
+        let q = pose.rotation;
+        let q = nalgebra::Quaternion::new(q.w as f64, q.x as f64, q.y as f64, q.z as f64);
+        let rotation = nalgebra::UnitQuaternion::from_quaternion(q)
+            .to_rotation_matrix()
+            .into_inner();
+        Self {
+            rotation,
+            translation: from_real(pose.translation),
+        }
+    }
+
+    /// Moves a point from the local frame to the world.
+    pub fn transform(&self, p: &Vec3) -> Vec3 {
+        self.rotation * p + self.translation
+    }
+
+    /// Moves a point from the world to the local frame.
+    pub fn inverse_transform(&self, p: &Vec3) -> Vec3 {
+        self.rotation.tr_mul(&(p - self.translation))
+    }
+
+    /// `self ∘ other`.
+    pub fn compose(&self, other: &Self) -> Self {
+        Self {
+            rotation: self.rotation * other.rotation,
+            translation: self.transform(&other.translation),
+        }
+    }
+}
+
+/// The rotation by the vector `w` [rad] (Rodrigues).
+pub(crate) fn rotation_from_vector(w: &Vec3) -> Mat3 {
+    nalgebra::Rotation3::new(*w).into_inner()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn tangents_complete_a_right_handed_frame(x in -1.0..1.0f64, y in -1.0..1.0f64, z in -1.0..1.0f64) {
+            prop_assume!(x * x + y * y + z * z > 1e-6);
+            let n = Vec3::new(x, y, z).normalize();
+            let [a, b] = tangents(&n);
+            // 1e-14: some tens of roundings of unit numbers.
+            prop_assert!((a.cross(&b) - n).norm() < 1e-14);
+            prop_assert!((a.norm() - 1.0).abs() < 1e-14 && a.dot(&n).abs() < 1e-14);
+        }
+    }
+}

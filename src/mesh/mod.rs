@@ -1,0 +1,16 @@
+//! Geometry of bodies at rest: tetrahedra, their surface, and where they come from.
+//!
+//! Architecture invariant: nothing here knows materials, time or rapier's sets.
+
+mod fill;
+#[cfg(feature = "gmsh")]
+mod gmsh;
+mod lattice;
+mod ordering;
+mod surface;
+mod tet_mesh;
+
+pub(crate) use ordering::{nested_dissection, node_adjacency};
+pub(crate) use surface::Surface;
+pub(crate) use tet_mesh::signed_volume;
+pub use tet_mesh::{MeshError, TetMesh};

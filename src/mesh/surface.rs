@@ -1,0 +1,129 @@
+//! The boundary surface of a tetrahedral mesh.
+
+use crate::math::Vec3;
+use std::collections::HashMap;
+
+/// The faces of a positively oriented tetrahedron, wound so that normals point outward.
+const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+
+/// Triangles, edges and nodes on the boundary of a mesh.
+#[derive(Clone, Debug)]
+pub(crate) struct Surface {
+    /// Mesh nodes of each triangle, wound outward.
+    pub triangles: Vec<[u32; 3]>,
+    /// Mesh nodes on the surface, ascending.
+    pub nodes: Vec<u32>,
+    /// Mesh nodes of each edge, ascending within the edge.
+    pub edges: Vec<[u32; 2]>,
+    /// Edges of each triangle, the k-th opposite corner k.
+    pub triangle_edges: Vec<[u32; 3]>,
+    /// Index into `nodes` per mesh node; `u32::MAX` inside the body.
+    pub index_of_node: Vec<u32>,
+    /// Mean length of the edges at rest [m].
+    pub mean_edge: f64,
+}
+
+impl Surface {
+    /// Extracts the surface of a valid mesh.
+    pub fn new(tetrahedra: &[[u32; 4]], rest: &[Vec3]) -> Self {
+        let triangles = boundary_triangles(tetrahedra).unwrap_or_default();
+        let mut index_of_node = vec![u32::MAX; rest.len()];
+        triangles.iter().flatten().for_each(|&n| index_of_node[n as usize] = 0);
+        let nodes: Vec<u32> = (0..rest.len() as u32)
+            .filter(|&n| index_of_node[n as usize] == 0)
+            .collect();
+        for (i, &n) in nodes.iter().enumerate() {
+            index_of_node[n as usize] = i as u32;
+        }
+        let edges: Vec<[u32; 2]> = edge_uses(&triangles).into_iter().map(|u| u.edge).collect();
+        let find = |a: u32, b: u32| {
+            edges.binary_search(&[a.min(b), a.max(b)]).unwrap_or(0) as u32
+        };
+        let triangle_edges = triangles
+            .iter()
+            .map(|&[a, b, c]| [find(b, c), find(c, a), find(a, b)])
+            .collect();
+        let length = |e: &[u32; 2]| (rest[e[0] as usize] - rest[e[1] as usize]).norm();
+        let mean_edge = edges.iter().map(length).sum::<f64>() / edges.len().max(1) as f64;
+        Self {
+            triangles,
+            nodes,
+            edges,
+            triangle_edges,
+            index_of_node,
+            mean_edge,
+        }
+    }
+}
+
+/// Faces that belong to one tetrahedron only, sorted by their first appearance; or a face that
+/// more than two share, with their number.
+pub(crate) fn boundary_triangles(
+    tetrahedra: &[[u32; 4]],
+) -> Result<Vec<[u32; 3]>, ([u32; 3], usize)> {
+    let faces = tetrahedra
+        .iter()
+        .flat_map(|t| FACES.map(|f| f.map(|k| t[k])));
+    let mut count: HashMap<[u32; 3], usize> = HashMap::with_capacity(2 * tetrahedra.len());
+    for face in faces.clone() {
+        *count.entry(sorted(face)).or_default() += 1;
+    }
+    if let Some((face, &n)) = count.iter().filter(|(_, n)| **n > 2).min() {
+        return Err((*face, n));
+    }
+    Ok(faces.filter(|&f| count[&sorted(f)] == 1).collect())
+}
+
+/// An edge and the number of triangles on it.
+pub(crate) struct EdgeUse {
+    pub edge: [u32; 2],
+    pub count: usize,
+}
+
+/// Edges of triangles in ascending order, with the number of triangles on each.
+pub(crate) fn edge_uses(triangles: &[[u32; 3]]) -> Vec<EdgeUse> {
+    let mut edges: Vec<[u32; 2]> = triangles
+        .iter()
+        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+        .map(|[a, b]| [a.min(b), a.max(b)])
+        .collect();
+    edges.sort_unstable();
+    edges
+        .chunk_by(|a, b| a == b)
+        .map(|run| EdgeUse {
+            edge: run[0],
+            count: run.len(),
+        })
+        .collect()
+}
+
+fn sorted(mut face: [u32; 3]) -> [u32; 3] {
+    face.sort_unstable();
+    face
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TetMesh;
+
+    #[test]
+    fn surface_of_a_cuboid_is_closed_and_encloses_its_volume() {
+        let mesh = TetMesh::cuboid([0.5, 0.3, 0.2], [4, 3, 2]).unwrap();
+        let rest: Vec<Vec3> = mesh.vertices().iter().map(|&v| v.into()).collect();
+        let surface = Surface::new(mesh.tetrahedra(), &rest);
+        assert_eq!(surface.triangles.len(), 2 * 2 * (4 * 3 + 3 * 2 + 4 * 2));
+        // Euler: V − E + F = 2.
+        let euler = surface.nodes.len() as i64 - surface.edges.len() as i64
+            + surface.triangles.len() as i64;
+        assert_eq!(euler, 2);
+        // Divergence theorem, 1e-15 roundings of O(1) terms.
+        let volume: f64 = surface
+            .triangles
+            .iter()
+            .map(|t| t.map(|i| rest[i as usize]))
+            .map(|[a, b, c]| a.dot(&b.cross(&c)) / 6.0)
+            .sum();
+        assert!((volume - mesh.volume()).abs() < 1e-13);
+    }
+}

@@ -1,0 +1,310 @@
+//! A tetrahedral mesh that is valid by construction.
+
+use super::surface::{EdgeUse, boundary_triangles, edge_uses};
+use crate::math::Vec3;
+use thiserror::Error;
+
+/// Relative volume (volume over cubed longest edge) below which a tetrahedron counts as flat; a
+/// regular one has 0.118. Flatter ones have gradients that no double precision factor survives.
+const FLAT: f64 = 1.0e-9;
+
+/// What is wrong with a mesh.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// No tetrahedra at all.
+    #[error("the mesh has no tetrahedra")]
+    Empty,
+    /// A coordinate is NaN or infinite.
+    #[error("vertex {vertex} is not finite: {position:?}")]
+    NotFinite {
+        /// Index of the vertex.
+        vertex: usize,
+        /// Its position [m].
+        position: [f64; 3],
+    },
+    /// An index points outside the vertex list.
+    #[error("tetrahedron {tet} refers to vertex {vertex}, but there are {vertices} vertices")]
+    IndexOutOfRange {
+        /// Index of the tetrahedron.
+        tet: usize,
+        /// The index it holds.
+        vertex: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// A tetrahedron names one vertex twice.
+    #[error("tetrahedron {tet} uses vertex {vertex} twice")]
+    RepeatedVertex {
+        /// Index of the tetrahedron.
+        tet: usize,
+        /// The repeated vertex.
+        vertex: u32,
+    },
+    /// Negative orientation.
+    #[error("tetrahedron {tet} is inverted (signed volume {volume:e} m³)")]
+    Inverted {
+        /// Index of the tetrahedron.
+        tet: usize,
+        /// Its signed volume [m³].
+        volume: f64,
+    },
+    /// No volume to speak of.
+    #[error("tetrahedron {tet} is flat (volume {volume:e} m³ with a longest edge of {edge:e} m)")]
+    Flat {
+        /// Index of the tetrahedron.
+        tet: usize,
+        /// Its volume [m³].
+        volume: f64,
+        /// Its longest edge [m].
+        edge: f64,
+    },
+    /// A vertex that no tetrahedron uses has no mass.
+    #[error("vertex {vertex} belongs to no tetrahedron")]
+    UnusedVertex {
+        /// Index of the vertex.
+        vertex: usize,
+    },
+    /// Three or more tetrahedra meet in one face.
+    #[error("{count} tetrahedra share the face {face:?}")]
+    NonManifoldFace {
+        /// Vertices of the face, ascending.
+        face: [u32; 3],
+        /// Number of tetrahedra on it.
+        count: usize,
+    },
+    /// The boundary surface branches, or closes on itself, in an edge.
+    #[error("{count} boundary triangles meet in the edge {edge:?}: the surface is not manifold")]
+    NonManifoldEdge {
+        /// Vertices of the edge, ascending.
+        edge: [u32; 2],
+        /// Number of boundary triangles on it; two would be right.
+        count: usize,
+    },
+    /// A lattice without cells or extent.
+    #[error("a cuboid of {cells:?} cells and half extents {half_extents:?} m has no volume")]
+    BadLattice {
+        /// Requested cells per axis.
+        cells: [usize; 3],
+        /// Requested half extents [m].
+        half_extents: [f64; 3],
+    },
+    /// More vertices than 32-bit indices can name.
+    #[error("a mesh of {vertices} vertices does not fit 32-bit indices")]
+    TooLarge {
+        /// Requested number of vertices.
+        vertices: usize,
+    },
+    /// A cell size that is not a positive number, or so small that the fill would not fit memory.
+    #[error("cell size {cell_size} m does not fill a shape of extents {extents:?} m")]
+    BadCellSize {
+        /// Requested cell size [m].
+        cell_size: f32,
+        /// Extents of the shape's bounding box [m].
+        extents: [f32; 3],
+    },
+    /// The surface encloses nothing that could be filled.
+    #[error("the surface of {triangles} triangles encloses no volume at cell size {cell_size} m")]
+    NothingEnclosed {
+        /// Triangles of the surface.
+        triangles: usize,
+        /// Requested cell size [m].
+        cell_size: f32,
+    },
+    /// A shape without a closed surface.
+    #[error("a shape of type {shape} has no closed surface to fill")]
+    NotFillable {
+        /// Name of the shape's type.
+        shape: String,
+    },
+    /// A mesh file that cannot be read.
+    #[error("mesh file {path}: {reason}")]
+    File {
+        /// The file as it was named.
+        path: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+/// Tetrahedra over shared vertices: indices in range, positive volumes, every vertex used, and a
+/// closed manifold surface. All of it is checked once, in [`TetMesh::new`].
+///
+/// ```
+/// use foible3d::TetMesh;
+/// let mesh = TetMesh::cuboid([0.5, 0.1, 0.1], [20, 4, 4]).unwrap();
+/// assert_eq!(mesh.tetrahedra().len(), 20 * 4 * 4 * 5);
+/// assert!((mesh.volume() - 1.0 * 0.2 * 0.2).abs() < 1e-12);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct TetMesh {
+    vertices: Vec<[f64; 3]>,
+    tetrahedra: Vec<[u32; 4]>,
+    volumes: Vec<f64>,
+}
+
+impl TetMesh {
+    /// Checks and takes a mesh: `vertices` in metres, four vertex indices per tetrahedron with
+    /// `det [b − a, c − a, d − a] > 0`.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with the index of the offender.
+    pub fn new(vertices: Vec<[f64; 3]>, tetrahedra: Vec<[u32; 4]>) -> Result<Self, MeshError> {
+        if tetrahedra.is_empty() {
+            return Err(MeshError::Empty);
+        }
+        if let Some(vertex) = vertices.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
+            let position = vertices[vertex];
+            return Err(MeshError::NotFinite { vertex, position });
+        }
+        let mut used = vec![false; vertices.len()];
+        let mut volumes = Vec::with_capacity(tetrahedra.len());
+        for (tet, corners) in tetrahedra.iter().enumerate() {
+            check_indices(tet, corners, vertices.len())?;
+            volumes.push(check_volume(tet, corners.map(|c| Vec3::from(vertices[c as usize])))?);
+            corners.iter().for_each(|&c| used[c as usize] = true);
+        }
+        if let Some(vertex) = used.iter().position(|u| !u) {
+            return Err(MeshError::UnusedVertex { vertex });
+        }
+        check_surface(&tetrahedra)?;
+        Ok(Self {
+            vertices,
+            tetrahedra,
+            volumes,
+        })
+    }
+
+    /// Rest positions [m], one per vertex.
+    pub fn vertices(&self) -> &[[f64; 3]] {
+        &self.vertices
+    }
+
+    /// Four vertex indices per tetrahedron.
+    pub fn tetrahedra(&self) -> &[[u32; 4]] {
+        &self.tetrahedra
+    }
+
+    /// Volume of each tetrahedron [m³].
+    pub fn volumes(&self) -> &[f64] {
+        &self.volumes
+    }
+
+    /// Volume of the mesh [m³].
+    pub fn volume(&self) -> f64 {
+        self.volumes.iter().sum()
+    }
+}
+
+fn check_indices(tet: usize, corners: &[u32; 4], vertices: usize) -> Result<(), MeshError> {
+    for (k, &vertex) in corners.iter().enumerate() {
+        if vertex as usize >= vertices {
+            return Err(MeshError::IndexOutOfRange {
+                tet,
+                vertex,
+                vertices,
+            });
+        }
+        if corners[..k].contains(&vertex) {
+            return Err(MeshError::RepeatedVertex { tet, vertex });
+        }
+    }
+    Ok(())
+}
+
+fn check_volume(tet: usize, p: [Vec3; 4]) -> Result<f64, MeshError> {
+    let volume = signed_volume(&p);
+    let edge = (0..4)
+        .flat_map(|i| (0..i).map(move |j| (i, j)))
+        .map(|(i, j)| (p[i] - p[j]).norm())
+        .fold(0.0, f64::max);
+    if volume.abs() <= FLAT * edge.powi(3) {
+        return Err(MeshError::Flat { tet, volume, edge });
+    }
+    if volume < 0.0 {
+        return Err(MeshError::Inverted { tet, volume });
+    }
+    Ok(volume)
+}
+
+/// Signed volume of a tetrahedron [m³].
+pub(crate) fn signed_volume(p: &[Vec3; 4]) -> f64 {
+    (p[1] - p[0]).cross(&(p[2] - p[0])).dot(&(p[3] - p[0])) / 6.0
+}
+
+fn check_surface(tetrahedra: &[[u32; 4]]) -> Result<(), MeshError> {
+    let triangles = boundary_triangles(tetrahedra)
+        .map_err(|(face, count)| MeshError::NonManifoldFace { face, count })?;
+    for EdgeUse { edge, count } in edge_uses(&triangles) {
+        if count != 2 {
+            return Err(MeshError::NonManifoldEdge { edge, count });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn corner() -> Vec<[f64; 3]> {
+        vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    }
+
+    #[test]
+    fn each_kind_of_bad_mesh_is_named() {
+        let tet = |v, t| TetMesh::new(v, t).unwrap_err();
+        assert_eq!(tet(corner(), vec![]), MeshError::Empty);
+        assert!(matches!(
+            tet(corner(), vec![[0, 2, 1, 3]]),
+            MeshError::Inverted { tet: 0, volume } if volume < 0.0
+        ));
+        assert!(matches!(
+            tet(corner(), vec![[0, 1, 2, 4]]),
+            MeshError::IndexOutOfRange { tet: 0, vertex: 4, vertices: 4 }
+        ));
+        assert!(matches!(
+            tet(corner(), vec![[0, 1, 2, 2]]),
+            MeshError::RepeatedVertex { tet: 0, vertex: 2 }
+        ));
+        let mut flat = corner();
+        flat[3] = [0.3, 0.3, 1e-12];
+        assert!(matches!(tet(flat, vec![[0, 1, 2, 3]]), MeshError::Flat { tet: 0, .. }));
+        let mut nan = corner();
+        nan[2][1] = f64::NAN;
+        assert!(matches!(tet(nan, vec![[0, 1, 2, 3]]), MeshError::NotFinite { vertex: 2, .. }));
+        let mut unused = corner();
+        unused.push([5.0; 3]);
+        assert_eq!(tet(unused, vec![[0, 1, 2, 3]]), MeshError::UnusedVertex { vertex: 4 });
+        // Two tetrahedra that share nothing but an edge.
+        let mut hinge = corner();
+        hinge.extend([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]);
+        assert!(matches!(
+            tet(hinge, vec![[0, 1, 2, 3], [0, 1, 4, 5]]),
+            MeshError::NonManifoldEdge { edge: [0, 1], count: 4 }
+        ));
+        // Three tetrahedra on one face.
+        let mut fan = corner();
+        fan.extend([[0.2, 0.2, 2.0], [0.1, 0.1, 3.0]]);
+        assert!(matches!(
+            tet(fan, vec![[0, 1, 2, 3], [0, 1, 2, 4], [0, 1, 2, 5]]),
+            MeshError::NonManifoldFace { face: [0, 1, 2], count: 3 }
+        ));
+    }
+
+    proptest! {
+        #[test]
+        fn random_tetrahedra_are_taken_or_refused_but_never_panic(
+            coordinates in proptest::collection::vec(
+                prop_oneof![8 => -1.0..1.0f64, 1 => Just(0.0), 1 => Just(f64::NAN), 1 => Just(1e300)], 3..30),
+            indices in proptest::collection::vec(0u32..12, 0..40),
+        ) {
+            let vertices: Vec<_> = coordinates.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
+            let tets: Vec<_> = indices.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect();
+            if let Ok(mesh) = TetMesh::new(vertices, tets) {
+                prop_assert!(mesh.volumes().iter().all(|&v| v > 0.0));
+            }
+        }
+    }
+}
