@@ -1,11 +1,68 @@
-//! Placeholder.
+//! Deformable bodies with a stiffness in pascals, coupled both ways to rapier3d rigid bodies.
+//!
+//! Projective Dynamics in residual form: one constant, prefactored matrix per body, exact forces of
+//! the elastic energy, and in every iteration a contact problem with Coulomb friction whose unknowns
+//! are forces in newtons.
+//!
+//! # The rooms, from the ground up
+//! | module | what it holds |
+//! |---|---|
+//! | `math` | vectors, SIMD lanes, polar decomposition |
+//! | `mesh` | tetrahedra: made, filled, read, checked; their surface |
+//! | `energy`, `material` | elastic energies, one per file; Young's modulus and the like |
+//! | `body` | model (constant), state (what a snapshot holds), body, builder, set |
+//! | `contact` | obstacles, closest features, rows, friction cone |
+//! | `solver` | constant matrix and factor, global iteration, contact problem |
+//! | `coupling` | rapier's sets, read and written |
+//! | `pipeline` | the step as a list of verbs, the world |
+//!
+//! # Invariants
+//! - A module imports from modules above it in the table only (`tests/architecture.rs`).
+//! - Only `coupling` knows rapier's sets, only `contact` names parry's queries, only
+//!   `solver/factor.rs` names faer.
+//! - State is `f64`; rapier's `f32` types appear at the surface.
+//! - Stepping never fails and never panics on data; what it keeps between steps is state, or is keyed
+//!   by the exact bits it was made from. A fresh pipeline gives the same bits as a reused one.
+// Matrices keep the names they have in the literature: F, R, A, W.
 #![allow(non_snake_case)]
+
 mod math;
+
 mod mesh;
+
 mod energy;
 mod material;
-mod error;
+
 mod body;
-pub use mesh::*; pub use body::*; pub use material::*; pub use error::*; pub use energy::Elasticity;
-/// prelude
-pub mod prelude { pub use crate::{DeformableBody, DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet, DeformableMaterial, DeformableModel}; }
+mod error;
+
+mod contact;
+
+mod solver;
+
+mod coupling;
+
+mod pipeline;
+
+pub use body::{
+    Acceleration, BodyError, DeformableBody, DeformableBodyBuilder, DeformableBodyHandle,
+    DeformableBodySet, DeformableModel, DeformableState, Frames, Pin, SolverSettings, SystemMatrix,
+};
+pub use energy::Elasticity;
+pub use error::{DeformableBodyError, HandleError};
+pub use material::{DeformableMaterial, MaterialError};
+pub use mesh::{MeshError, TetMesh};
+pub use pipeline::{
+    DeformableContact, DeformableCounters, DeformableParameters, DeformablePipeline,
+    DeformableWorld,
+};
+
+/// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
+pub mod prelude {
+    pub use crate::{
+        Acceleration, DeformableBody, DeformableBodyBuilder, DeformableBodyError,
+        DeformableBodyHandle, DeformableBodySet, DeformableContact, DeformableCounters,
+        DeformableMaterial, DeformableModel, DeformableParameters, DeformablePipeline,
+        DeformableWorld, Elasticity, Frames, SolverSettings, SystemMatrix, TetMesh,
+    };
+}

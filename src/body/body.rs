@@ -63,7 +63,6 @@ pub(crate) struct StepReport {
     pub residual: f64,
     pub tolerance: f64,
     pub guard_retries: usize,
-    pub elastic_energy: f64,
     pub quarantined: bool,
 }
 

@@ -35,7 +35,7 @@ type Geometry = (Vec<[f64; 3]>, Vec<[u32; 4]>);
 
 fn tetrahedra_of(file: &MshFile<u64, i32, f64>) -> Result<Geometry, String> {
     let mut position_of_tag = HashMap::new();
-    for nodes in &file.data.nodes {
+    if let Some(nodes) = &file.data.nodes {
         // Blocks without explicit tags number their nodes in the file's order.
         let mut next = nodes.min_node_tag;
         for block in &nodes.node_blocks {

@@ -1,0 +1,87 @@
+//! Which obstacles come near a body: a bounding volume hierarchy over what stands still, a list of
+//! what moves.
+
+use super::Obstacle;
+use parry3d::bounding_volume::{Aabb, BoundingVolume};
+use parry3d::partitioning::{Bvh, BvhBuildStrategy};
+
+/// The broad phase over the obstacles of a step. The tree is kept while nothing in it changes.
+#[derive(Default)]
+pub(crate) struct Candidates {
+    still: Vec<(u32, Aabb)>,
+    moving: Vec<(u32, Aabb)>,
+    tree: Option<Bvh>,
+    tree_leaves: Vec<(u32, Aabb)>,
+}
+
+/// Below this number of still obstacles a list is faster than a tree.
+const FEW: usize = 32;
+
+impl Candidates {
+    /// Takes in the obstacles of this step.
+    pub fn update(&mut self, obstacles: &[Obstacle]) {
+        self.still.clear();
+        self.moving.clear();
+        for (i, obstacle) in obstacles.iter().enumerate() {
+            let moves = obstacle.start != obstacle.end;
+            let list = if moves { &mut self.moving } else { &mut self.still };
+            list.push((i as u32, obstacle.swept_aabb()));
+        }
+        if self.still.len() < FEW {
+            self.tree = None;
+        } else if self.tree.is_none() || self.tree_leaves != self.still {
+            let leaves = self.still.iter().map(|(i, aabb)| (*i as usize, *aabb));
+            self.tree = Some(Bvh::from_iter(BvhBuildStrategy::Binned, leaves));
+            self.tree_leaves.clone_from(&self.still);
+        }
+    }
+
+    /// Obstacles whose boxes meet `aabb`, ascending.
+    pub fn near(&self, aabb: &Aabb, found: &mut Vec<u32>) {
+        found.clear();
+        let meets = |list: &[(u32, Aabb)], found: &mut Vec<u32>| {
+            found.extend(list.iter().filter(|(_, b)| b.intersects(aabb)).map(|(i, _)| *i));
+        };
+        meets(&self.moving, found);
+        match &self.tree {
+            Some(tree) => found.extend(tree.intersect_aabb(aabb)),
+            None => meets(&self.still, found),
+        }
+        found.sort_unstable();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::PartnerId;
+    use crate::math::{Mat3, Pose64, Vec3};
+    use parry3d::math::Vector;
+    use parry3d::shape::SharedShape;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn tree_finds_what_all_pairs_find(
+            places in proptest::collection::vec((-5.0..5.0f64, -5.0..5.0f64, -5.0..5.0f64, any::<bool>()), 0..120),
+            x in -5.0..5.0f32,
+        ) {
+            let obstacles: Vec<Obstacle> = places.iter().enumerate().map(|(i, &(x, y, z, moves))| {
+                let start = Pose64 { rotation: Mat3::identity(), translation: Vec3::new(x, y, z) };
+                let mut end = start;
+                end.translation.x += if moves { 0.5 } else { 0.0 };
+                let shape = if i == 7 { SharedShape::halfspace(Vector::Y) } else { SharedShape::ball(0.3) };
+                Obstacle { partner: PartnerId(i as u32), key: i as u64, part: 0, shape, start, end }
+            }).collect();
+            let mut candidates = Candidates::default();
+            candidates.update(&obstacles);
+            let aabb = Aabb::new(Vector::new(x, -1.0, -1.0), Vector::new(x + 1.0, 1.0, 1.0));
+            let mut found = Vec::new();
+            candidates.near(&aabb, &mut found);
+            let all: Vec<u32> = (0..obstacles.len() as u32)
+                .filter(|&i| obstacles[i as usize].swept_aabb().intersects(&aabb))
+                .collect();
+            prop_assert_eq!(found, all);
+        }
+    }
+}

@@ -1,0 +1,17 @@
+//! Where bodies touch obstacles: candidates, closest features, rows, and the friction cone.
+//!
+//! Architecture invariant: the only room that names parry's queries, and it knows no rapier sets:
+//! `coupling` fills the [`Obstacle`]s.
+
+mod candidates;
+pub(crate) mod cone;
+mod detection;
+mod obstacle;
+mod row;
+mod surface_point;
+mod triangle_rows;
+
+pub(crate) use candidates::Candidates;
+pub(crate) use detection::{Detector, Pair};
+pub(crate) use obstacle::{Obstacle, PartnerId};
+pub(crate) use row::{Row, Side};

@@ -1,0 +1,67 @@
+//! Rigid geometry as contact sees it.
+
+use crate::math::{Pose64, Vec3};
+use parry3d::bounding_volume::Aabb;
+use parry3d::shape::{SharedShape, TypedShape};
+
+/// Names a rigid body (or a collider without one) within a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct PartnerId(pub u32);
+
+/// One collider, with the motion it makes over the step if nothing touches it.
+#[derive(Clone)]
+pub(crate) struct Obstacle {
+    pub partner: PartnerId,
+    /// Names the collider over several steps.
+    pub key: u64,
+    /// Part of a compound.
+    pub part: u32,
+    pub shape: SharedShape,
+    pub start: Pose64,
+    pub end: Pose64,
+}
+
+/// How "inside" is to be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Solidity {
+    /// The shape has an inside that projections know.
+    Solid,
+    /// A sheet: the side is the one the body comes from.
+    Sheet,
+}
+
+impl Obstacle {
+    /// Displacement over the step [m] of the obstacle's material point that is at `p` at its start.
+    pub fn displacement(&self, p: &Vec3) -> Vec3 {
+        self.end.transform(&self.start.inverse_transform(p)) - p
+    }
+
+    /// Box around all of the step.
+    pub fn swept_aabb(&self) -> Aabb {
+        let local = self.shape.compute_local_aabb();
+        if self.shape.as_halfspace().is_some() {
+            return local;
+        }
+        let corner = |pose: &Pose64, v: parry3d::math::Vector| {
+            crate::math::to_real(&pose.transform(&crate::math::from_real(v)))
+        };
+        let vertices = local.vertices();
+        let corners = vertices.iter().flat_map(|&v| [corner(&self.start, v), corner(&self.end, v)]);
+        Aabb::from_points(corners)
+    }
+
+    pub fn solidity(&self) -> Solidity {
+        match self.shape.as_typed_shape() {
+            TypedShape::TriMesh(mesh) if mesh.pseudo_normals_if_oriented().is_none() => Solidity::Sheet,
+            TypedShape::HeightField(_) | TypedShape::Triangle(_) | TypedShape::Segment(_) | TypedShape::Polyline(_) => {
+                Solidity::Sheet
+            }
+            _ => Solidity::Solid,
+        }
+    }
+
+    /// A plane without edges: its contacts with a body are all at nodes.
+    pub fn is_half_space(&self) -> bool {
+        self.shape.as_halfspace().is_some()
+    }
+}

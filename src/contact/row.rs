@@ -1,0 +1,86 @@
+//! A contact as the solver sees it: three rows (normal and two tangents), or one without friction.
+
+use super::PartnerId;
+use crate::body::ContactKey;
+use crate::math::{Vec3, tangents};
+
+/// One side of a contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Side {
+    /// A point of a body's surface: a weighted sum of up to three nodes.
+    Soft {
+        /// Index of the body in the step's list.
+        body: usize,
+        nodes: [u32; 3],
+        /// Sum to one; zero for nodes that do not count.
+        weights: [f64; 3],
+    },
+    /// A point of a rigid body, at the start of the step [m].
+    Partner { partner: PartnerId, point: Vec3 },
+}
+
+/// A contact. Forces are positive on side 0 and negative on side 1.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Row {
+    pub sides: [Side; 2],
+    /// Normal, from side 1 to side 0, and two tangents.
+    pub frame: [Vec3; 3],
+    /// Distance along the normal at the start of the step [m].
+    pub gap: f64,
+    pub friction: f64,
+    pub restitution: f64,
+    pub key: ContactKey,
+    /// Force on side 0 in the last step [N].
+    pub warm_force: Vec3,
+    /// De Saxcé shift of the last step, per second of it [m/s].
+    pub warm_shift_rate: f64,
+}
+
+impl Row {
+    pub fn new(sides: [Side; 2], normal: Vec3, gap: f64, key: ContactKey) -> Self {
+        let [t1, t2] = tangents(&normal);
+        Self {
+            sides,
+            frame: [normal, t1, t2],
+            gap,
+            friction: 0.0,
+            restitution: 0.0,
+            key,
+            warm_force: Vec3::zeros(),
+            warm_shift_rate: 0.0,
+        }
+    }
+
+    /// Rows of this contact in the solver: three, or one without friction.
+    pub fn dimension(&self) -> usize {
+        if self.friction > 0.0 { 3 } else { 1 }
+    }
+
+    /// Directions of those rows.
+    pub fn directions(&self) -> &[Vec3] {
+        &self.frame[..self.dimension()]
+    }
+
+    /// The force in the world of the components `lambda` [N].
+    pub fn force(&self, lambda: &[f64]) -> Vec3 {
+        let terms = self.directions().iter().zip(lambda);
+        terms.fold(Vec3::zeros(), |sum, (d, l)| sum + d * *l)
+    }
+}
+
+impl Side {
+    /// Weighted nodes of a soft side; nothing for a partner.
+    pub fn soft_nodes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let (nodes, weights) = match self {
+            Side::Soft { nodes, weights, .. } => (*nodes, *weights),
+            Side::Partner { .. } => ([0; 3], [0.0; 3]),
+        };
+        let pairs = nodes.into_iter().zip(weights);
+        pairs.filter(|(_, w)| *w != 0.0).map(|(n, w)| (n as usize, w))
+    }
+
+    /// Value of a nodal field at a soft side.
+    pub fn interpolate(&self, field: &[Vec3]) -> Vec3 {
+        self.soft_nodes().fold(Vec3::zeros(), |sum, (n, w)| sum + field[n] * w)
+    }
+}

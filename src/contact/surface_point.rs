@@ -1,0 +1,238 @@
+//! The point of an obstacle's surface nearest to a node, with one normal that is continuous inside,
+//! on, and outside the surface.
+//!
+//! A projection alone has no direction on the surface itself, and just inside an edge it picks the
+//! wrong face. So near the surface the normal comes from the feature, or from a second projection
+//! of the node shifted back into its body, where "outside" is unambiguous. parry answers in `f32`;
+//! the gap is taken along the normal with the node's `f64` position.
+
+use super::obstacle::{Obstacle, Solidity};
+use crate::math::{Vec3, from_real, to_real};
+use parry3d::shape::FeatureId;
+
+/// In the obstacle's frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SurfacePoint {
+    pub point: Vec3,
+    /// Outward.
+    pub normal: Vec3,
+    /// Signed distance along the normal [m].
+    pub gap: f64,
+    /// The normal is that of a plane face, exact.
+    pub flat: bool,
+}
+
+/// Lengths that decide which of the normals is used.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scales {
+    /// Nearer than this to the surface a projection's direction is noise [m].
+    pub band: f64,
+    /// Shift back into the body for the second projection [m].
+    pub shift: f64,
+}
+
+/// Cosine beyond which a normal counts as facing the body's surface.
+const FACING: f64 = -0.1;
+
+/// Projects `p` (in the obstacle's frame) onto the obstacle. `outward` is the unit normal of the
+/// body's own surface at `p`, in that frame too. `None` where parry finds nothing, as for
+/// non-finite input.
+pub(crate) fn surface_point(
+    obstacle: &Obstacle,
+    p: &Vec3,
+    outward: &Vec3,
+    scales: &Scales,
+) -> Option<SurfacePoint> {
+    if let Some(ball) = obstacle.shape.as_ball() {
+        return on_ball(ball.radius as f64, p, outward);
+    }
+    let hit = project(obstacle, p)?;
+    let faces_body = |normal: &Vec3| normal.dot(outward) < FACING;
+    let near = hit.distance <= scales.band;
+    if obstacle.solidity() == Solidity::Sheet {
+        let mut normal = match (near, hit.face) {
+            (true, Some(face)) => face,
+            (true, None) => -outward,
+            (false, face) => face_or(hit.direction?, face),
+        };
+        // Just behind a sheet, seen from the body: the node has passed and is to come back.
+        let behind = hit.distance < scales.shift && normal.dot(outward) > 0.3;
+        if behind || (near && !faces_body(&normal)) {
+            normal = -normal;
+        }
+        return Some(hit.with(p, normal));
+    }
+    if !hit.inside && !near {
+        return Some(hit.with(p, face_or(hit.direction?, hit.face)));
+    }
+    if let Some(face) = hit.face
+        && faces_body(&face)
+    {
+        return Some(hit.with(p, face));
+    }
+    let inward = hit.direction.map(|d| if hit.inside { -d } else { d });
+    if !near && hit.face.is_none() && inward.is_some_and(|d| faces_body(&d)) {
+        return Some(hit.with(p, inward?));
+    }
+    let back = project(obstacle, &(p - outward * scales.shift))?;
+    match back.direction {
+        Some(direction) if !back.inside && faces_body(&direction) => {
+            Some(back.with(p, face_or(direction, back.face)))
+        }
+        _ => Some(hit.with(p, hit.face.or(inward).unwrap_or(-outward))),
+    }
+}
+
+/// In `f64` throughout.
+fn on_ball(radius: f64, p: &Vec3, outward: &Vec3) -> Option<SurfacePoint> {
+    let distance = p.norm();
+    let normal = if distance > 0.0 { p / distance } else { -outward };
+    Some(SurfacePoint {
+        point: normal * radius,
+        normal,
+        gap: distance - radius,
+        flat: false,
+    })
+}
+
+/// A projection with what can be told of it.
+struct Projection {
+    point: Vec3,
+    inside: bool,
+    distance: f64,
+    /// From the surface point to `p`, unit; none at zero distance.
+    direction: Option<Vec3>,
+    /// Outward normal of the plane face that was hit.
+    face: Option<Vec3>,
+}
+
+fn project(obstacle: &Obstacle, p: &Vec3) -> Option<Projection> {
+    let shape = &obstacle.shape;
+    let (projection, feature) = shape.project_local_point_and_get_feature(to_real(p));
+    let point = from_real(projection.point);
+    if !point.iter().all(|c| c.is_finite()) {
+        return None;
+    }
+    let offset = p - point;
+    let distance = offset.norm();
+    // Capsules call all of themselves one face; only plane ones have a normal here.
+    let plane = matches!(feature, FeatureId::Face(_)) && shape.as_capsule().is_none();
+    let normal = || shape.feature_normal_at_point(projection.subshape, feature, projection.point);
+    let face = if plane { normal().map(from_real) } else { None };
+    let face = face.and_then(|n| n.try_normalize(0.5)).or_else(|| {
+        let half_space = shape.as_halfspace()?;
+        Some(from_real(half_space.normal).normalize())
+    });
+    Some(Projection {
+        point,
+        inside: projection.is_inside,
+        distance,
+        direction: (distance > 0.0).then(|| offset / distance),
+        face,
+    })
+}
+
+/// The exact normal of the face if that is what the direction means, up to sign.
+fn face_or(direction: Vec3, face: Option<Vec3>) -> Vec3 {
+    match face {
+        Some(n) if n.dot(&direction) > 0.99 => n,
+        Some(n) if n.dot(&direction) < -0.99 => -n,
+        _ => direction,
+    }
+}
+
+impl Projection {
+    fn with(&self, p: &Vec3, normal: Vec3) -> SurfacePoint {
+        SurfacePoint {
+            point: self.point,
+            normal,
+            gap: normal.dot(&(p - self.point)),
+            flat: self.face.is_some_and(|n| n == normal || n == -normal),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::PartnerId;
+    use crate::math::{Mat3, Pose64};
+    use parry3d::math::Vector;
+    use parry3d::shape::SharedShape;
+
+    fn obstacle(shape: SharedShape) -> Obstacle {
+        let start = Pose64 { rotation: Mat3::identity(), translation: Vec3::zeros() };
+        Obstacle { partner: PartnerId(0), key: 0, part: 0, shape, start, end: start }
+    }
+
+    const SCALES: Scales = Scales { band: 4e-5, shift: 0.01 };
+
+    #[test]
+    fn normal_is_one_and_continuous_through_the_surface_of_every_solid_shape() {
+        let cube: Vec<Vector> = (0..8)
+            .map(|i| Vector::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) - Vector::splat(0.5))
+            .collect();
+        let shapes = [
+            SharedShape::halfspace(Vector::Y),
+            SharedShape::cuboid(0.5, 0.5, 0.5),
+            SharedShape::convex_hull(&cube).unwrap(),
+            SharedShape::cylinder(0.5, 0.5),
+            SharedShape::cone(0.5, 0.5),
+            SharedShape::ball(0.5),
+            SharedShape::capsule_y(0.2, 0.3),
+            SharedShape::round_cuboid(0.4, 0.4, 0.4, 0.1),
+            SharedShape::round_cylinder(0.4, 0.4, 0.1),
+            SharedShape::round_cone(0.4, 0.4, 0.1),
+            SharedShape::round_convex_hull(&cube, 0.1).unwrap(),
+        ];
+        for shape in shapes {
+            let kind = shape.shape_type();
+            let obstacle = obstacle(shape);
+            // The surface below a point a little off the axis, from far outside.
+            let outward = -Vec3::y();
+            // A cone is approached on its flank, away from its tip.
+            let on_flank = kind == parry3d::shape::ShapeType::Cone;
+            let above = if on_flank { Vec3::new(0.7, 0.4, 0.3) } else { Vec3::new(0.013, 2.0, 0.021) };
+            let top = surface_point(&obstacle, &above, &outward, &SCALES).unwrap();
+            for depth in [-0.03, -1e-3, -1e-4, -1e-6, -1e-8, 0.0, 1e-8, 1e-6, 1e-4, 1e-3, 0.03] {
+                let p = top.point + top.normal * depth;
+                let found = surface_point(&obstacle, &p, &-top.normal, &SCALES).unwrap();
+                // f32 projections: 1e-7 of coordinates of 1 m, over the shift of 0.01 m and the
+                // curvature of GJK's round shapes; gaps to a few ulp of f32.
+                assert!((found.normal - top.normal).norm() < 2e-3, "{kind:?} {depth}: {} {}", found.normal, top.normal);
+                assert!((found.gap - depth).abs() < 2e-6 + 2e-3 * depth.abs(), "{kind:?} {depth}: {}", found.gap);
+            }
+        }
+    }
+
+    #[test]
+    fn just_inside_an_edge_the_face_towards_the_body_is_taken() {
+        let obstacle = obstacle(SharedShape::cuboid(0.5, 0.5, 0.5));
+        // A body on top, its rim in line with the box: nearest is the side face.
+        for x in [0.5 - 1e-7, 0.5, 0.5 + 1e-7] {
+            let rim = Vec3::new(1.0, -1.0, 0.0).normalize();
+            let p = Vec3::new(x, 0.5 - 1e-6, 0.1);
+            let found = surface_point(&obstacle, &p, &rim, &SCALES).unwrap();
+            assert!((found.normal - Vec3::y()).norm() < 1e-6, "{x}: {}", found.normal);
+        }
+    }
+
+    #[test]
+    fn sheets_push_back_to_the_side_the_body_is_on() {
+        let vertices = vec![
+            Vector::new(-1.0, 0.0, -1.0),
+            Vector::new(1.0, 0.0, -1.0),
+            Vector::new(0.0, 0.0, 1.0),
+        ];
+        for triangle in [[0, 1, 2], [0, 2, 1]] {
+            let mesh = SharedShape::trimesh(vertices.clone(), vec![triangle]).unwrap();
+            let obstacle = obstacle(mesh);
+            for (side, depth) in [(1.0, 1e-3), (1.0, 0.0), (1.0, -1e-3), (-1.0, 1e-3), (-1.0, -1e-3)] {
+                let p = Vec3::new(0.05, side * depth, 0.02);
+                let found = surface_point(&obstacle, &p, &Vec3::new(0.0, -side, 0.0), &SCALES).unwrap();
+                assert!((found.normal - Vec3::y() * side).norm() < 1e-6);
+                assert!((found.gap - depth).abs() < 1e-7);
+            }
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! Colliders and rigid bodies as obstacles and partners.
+
+use super::RapierSets;
+use crate::body::DeformableBody;
+use crate::contact::{Obstacle, PartnerId};
+use crate::math::{Mat3, Pose64, Vec3, from_real, rotation_from_vector};
+use crate::solver::Partner;
+use parry3d::shape::{SharedShape, TypedShape};
+use rapier3d::dynamics::{CoefficientCombineRule, RigidBody, RigidBodyHandle, RigidBodyMassProps, RigidBodyType};
+use rapier3d::geometry::{Collider, ColliderHandle, InteractionGroups};
+use rapier3d::math::Vector;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// The rigid world of one step.
+#[derive(Default)]
+pub(crate) struct RapierScene {
+    pub obstacles: Vec<Obstacle>,
+    pub partners: Vec<Partner>,
+    /// Rigid body of each partner; none for colliders without one.
+    pub handles: Vec<Option<RigidBodyHandle>>,
+    /// Collider of each obstacle.
+    pub colliders: Vec<ColliderHandle>,
+    partner_of_body: HashMap<RigidBodyHandle, PartnerId>,
+    /// Heightfields as triangle meshes, which project points faster. The field is kept too, so
+    /// that its address stays its own.
+    meshes: HashMap<usize, (SharedShape, SharedShape)>,
+}
+
+impl RapierScene {
+    /// Reads all enabled solid colliders, as they will move over the next `dt` [s].
+    pub fn read(&mut self, sets: RapierSets<'_>, gravity: Vector, dt: f64) {
+        self.obstacles.clear();
+        self.partners.clear();
+        self.handles.clear();
+        self.colliders.clear();
+        self.partner_of_body.clear();
+        for (handle, collider) in sets.colliders.iter() {
+            if !collider.is_enabled() || collider.is_sensor() {
+                continue;
+            }
+            let body = collider.parent().and_then(|h| Some((h, sets.bodies.get(h)?)));
+            if body.is_some_and(|(_, b)| !b.is_enabled() || b.is_soft_frame() || b.soft_body().is_some()) {
+                continue;
+            }
+            let (partner, start, end) = match body {
+                Some((body_handle, body)) => {
+                    let partner = self.partner(sets, body_handle, body, gravity, dt);
+                    let offset = collider.position_wrt_parent().map(Pose64::from_real);
+                    let start = Pose64::from_real(body.position());
+                    let end = end_pose(&self.partners[partner.0 as usize], &start, dt);
+                    let place = |pose: Pose64| offset.map_or(pose, |offset| pose.compose(&offset));
+                    (partner, place(start), place(end))
+                }
+                None => {
+                    let pose = Pose64::from_real(collider.position());
+                    let partner = self.push_partner(Partner::Prescribed { start: pose, end: pose }, None);
+                    (partner, pose, pose)
+                }
+            };
+            self.push_shape(handle, partner, collider.shared_shape().clone(), start, end);
+        }
+    }
+
+    /// The collider that an obstacle's key names.
+    pub fn collider_of(&self, key: u64) -> ColliderHandle {
+        ColliderHandle::from_raw_parts((key >> 32) as u32, key as u32)
+    }
+
+    fn partner(
+        &mut self,
+        sets: RapierSets<'_>,
+        handle: RigidBodyHandle,
+        body: &RigidBody,
+        gravity: Vector,
+        dt: f64,
+    ) -> PartnerId {
+        if let Some(id) = self.partner_of_body.get(&handle) {
+            return *id;
+        }
+        let partner = partner_of(sets, handle, body, gravity, dt);
+        let id = self.push_partner(partner, Some(handle));
+        self.partner_of_body.insert(handle, id);
+        id
+    }
+
+    fn push_partner(&mut self, partner: Partner, handle: Option<RigidBodyHandle>) -> PartnerId {
+        self.partners.push(partner);
+        self.handles.push(handle);
+        PartnerId(self.partners.len() as u32 - 1)
+    }
+
+    fn push_shape(
+        &mut self,
+        handle: ColliderHandle,
+        partner: PartnerId,
+        shape: SharedShape,
+        start: Pose64,
+        end: Pose64,
+    ) {
+        let (index, generation) = handle.into_raw_parts();
+        let mut push = |shape: SharedShape, part: u32, start: Pose64, end: Pose64| {
+            self.colliders.push(handle);
+            self.obstacles.push(Obstacle {
+                partner,
+                key: u64::from(index) << 32 | u64::from(generation),
+                part,
+                shape,
+                start,
+                end,
+            });
+        };
+        match shape.as_typed_shape() {
+            TypedShape::Compound(compound) => {
+                for (part, (offset, shape)) in compound.shapes().iter().enumerate() {
+                    let offset = Pose64::from_real(offset);
+                    push(shape.clone(), part as u32, start.compose(&offset), end.compose(&offset));
+                }
+            }
+            TypedShape::HeightField(field) => {
+                let address = Arc::as_ptr(&shape.0).cast::<()>() as usize;
+                let (_, mesh) = self.meshes.entry(address).or_insert_with(|| {
+                    let (vertices, triangles) = field.to_trimesh();
+                    let mesh = SharedShape::trimesh(vertices, triangles);
+                    (shape.clone(), mesh.unwrap_or_else(|_| shape.clone()))
+                });
+                push(mesh.clone(), 0, start, end);
+            }
+            _ => push(shape, 0, start, end),
+        }
+    }
+}
+
+/// Friction and restitution of a pair by rapier's rules, if its groups let it touch.
+pub(crate) fn combined(body: &DeformableBody, collider: &Collider) -> Option<(f64, f64)> {
+    let groups = collider.collision_groups();
+    let solved = InteractionGroups::all().test(collider.solver_groups());
+    if !solved || !body.collision_groups().test(groups) {
+        return None;
+    }
+    let material = collider.material();
+    let combine = |own: f64, other: f32, own_rule, other_rule| {
+        f64::from(CoefficientCombineRule::combine(own as f32, other, own_rule, other_rule))
+    };
+    let friction = combine(
+        body.material.friction,
+        material.friction,
+        body.friction_combine_rule(),
+        material.friction_combine_rule,
+    );
+    let restitution = combine(
+        body.material.restitution,
+        material.restitution,
+        body.restitution_combine_rule(),
+        material.restitution_combine_rule,
+    );
+    Some((friction.max(0.0), restitution.clamp(0.0, 1.0)))
+}
+
+fn partner_of(
+    sets: RapierSets<'_>,
+    handle: RigidBodyHandle,
+    body: &RigidBody,
+    gravity: Vector,
+    dt: f64,
+) -> Partner {
+    let start = Pose64::from_real(body.position());
+    let prescribed = |end: Pose64| Partner::Prescribed { start, end };
+    match body.body_type() {
+        RigidBodyType::Fixed => prescribed(start),
+        RigidBodyType::KinematicPositionBased => prescribed(Pose64::from_real(body.next_position())),
+        RigidBodyType::KinematicVelocityBased => {
+            prescribed(Pose64::from_real(&body.predict_position_using_velocity(dt as f32)))
+        }
+        // A link's own velocity is not its to change: it carries the soft body as a kinematic one.
+        _ if sets.multibody_joints.rigid_body_link(handle).is_some() => {
+            prescribed(Pose64::from_real(&body.predict_position_using_velocity(dt as f32)))
+        }
+        _ => {
+            let masses = current_mass_properties(sets, body);
+            let inertia = masses.effective_world_inv_inertia;
+            let inv_inertia = Mat3::new(
+                inertia.m11.into(), inertia.m12.into(), inertia.m13.into(),
+                inertia.m12.into(), inertia.m22.into(), inertia.m23.into(),
+                inertia.m13.into(), inertia.m23.into(), inertia.m33.into(),
+            );
+            let inv_mass = from_real(masses.effective_inv_mass);
+            let force = from_real(external_force(body, &masses, gravity));
+            let torque = from_real(body.user_torque());
+            let (linvel, angvel) = (from_real(body.linvel()), from_real(body.angvel()));
+            Partner::Rigid {
+                com: from_real(masses.world_com),
+                inv_mass,
+                inv_inertia,
+                linvel,
+                angvel,
+                free_linvel: linvel + inv_mass.component_mul(&force) * dt,
+                free_angvel: angvel + inv_inertia * torque * dt,
+            }
+        }
+    }
+}
+
+/// Mass properties at the current pose. Rapier brings its own up to date only within a step, so
+/// after an insertion or a teleport they are old.
+fn current_mass_properties(sets: RapierSets<'_>, body: &RigidBody) -> RigidBodyMassProps {
+    let mut masses = body.mass_properties().clone();
+    if masses.local_mprops.inv_mass == 0.0 {
+        let mut copy = body.clone();
+        copy.recompute_mass_properties_from_colliders(sets.colliders);
+        masses = copy.mass_properties().clone();
+    }
+    masses.update_world_mass_properties(body.body_type(), body.position());
+    masses
+}
+
+/// Gravity and the user's own force, in the order and precision in which rapier adds them.
+pub(super) fn external_force(body: &RigidBody, masses: &RigidBodyMassProps, gravity: Vector) -> Vector {
+    body.user_force() + gravity * masses.effective_mass() * body.gravity_scale()
+}
+
+/// Where a partner's body ends up if nothing touches it.
+fn end_pose(partner: &Partner, start: &Pose64, dt: f64) -> Pose64 {
+    match partner {
+        Partner::Prescribed { end, .. } => *end,
+        Partner::Rigid { com, free_linvel, free_angvel, .. } => {
+            let turn = rotation_from_vector(&(free_angvel * dt));
+            let origin: Vec3 = com + free_linvel * dt + turn * (start.translation - com);
+            Pose64 {
+                rotation: turn * start.rotation,
+                translation: origin,
+            }
+        }
+    }
+}

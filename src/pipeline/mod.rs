@@ -1,0 +1,14 @@
+//! The step, told as a list of verbs, and the world that owns it.
+
+mod contacts;
+mod parameters;
+#[allow(clippy::module_inception)]
+mod pipeline;
+mod threads;
+mod work;
+mod world;
+
+pub use contacts::DeformableContact;
+pub use parameters::{DeformableCounters, DeformableParameters};
+pub use pipeline::DeformablePipeline;
+pub use world::DeformableWorld;

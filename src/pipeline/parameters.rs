@@ -1,0 +1,95 @@
+//! World-wide parameters and the counters of a step.
+
+use crate::solver::ContactLimits;
+use std::time::Duration;
+
+/// Parameters of all bodies of a world. The defaults suit scenes in metres and kilograms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeformableParameters {
+    /// Relative accuracy to which contact forces are solved.
+    pub contact_tolerance: f64,
+    /// Speed [m/s] at which overlaps found at the start of a step are undone.
+    pub max_corrective_velocity: f64,
+    /// New contacts that approach below this speed [m/s] do not bounce.
+    pub restitution_threshold: f64,
+    /// Memory [bytes] for columns of inverses, kept between steps for contacts.
+    pub column_budget: usize,
+}
+
+impl Default for DeformableParameters {
+    fn default() -> Self {
+        Self {
+            contact_tolerance: 1.0e-6,
+            max_corrective_velocity: 1.0,
+            restitution_threshold: 0.5,
+            column_budget: 512 << 20,
+        }
+    }
+}
+
+impl DeformableParameters {
+    pub(crate) fn contact_limits(&self) -> ContactLimits {
+        ContactLimits {
+            recovery_speed: self.max_corrective_velocity,
+            restitution_threshold: self.restitution_threshold,
+            tolerance: self.contact_tolerance,
+        }
+    }
+}
+
+/// What the last step did, and how long it took.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct DeformableCounters {
+    /// Bodies stepped.
+    pub bodies: usize,
+    /// Groups of bodies that were solved independently.
+    pub islands: usize,
+    /// Colliders (or parts of compounds) read.
+    pub obstacles: usize,
+    /// Body–collider pairs looked at closely.
+    pub pairs: usize,
+    /// Contacts found.
+    pub contacts: usize,
+    /// Contacts that carry force.
+    pub active_contacts: usize,
+    /// Global iterations, summed over islands.
+    pub iterations: usize,
+    /// Bodies that stopped at their iteration limit, above their tolerance.
+    pub not_converged: usize,
+    /// Times the guard had to scale the metric.
+    pub guard_retries: usize,
+    /// Newton steps of the contact problems.
+    pub newton_steps: usize,
+    /// Dense factorizations of the contact problems.
+    pub contact_factorizations: usize,
+    /// Contact problems that did not reach their tolerance.
+    pub contact_failures: usize,
+    /// Sparse factorizations.
+    pub factorizations: usize,
+    /// Nodes for which columns of the inverse were made.
+    pub columns: usize,
+    /// Bytes of sparse factors held.
+    pub factor_bytes: usize,
+    /// Bytes of columns held.
+    pub column_bytes: usize,
+    /// Bodies put aside because their state was not finite.
+    pub quarantined: usize,
+    /// Whether the step was skipped because dt or gravity was not usable.
+    pub skipped: bool,
+    /// Reading obstacles, finding and detecting contacts.
+    pub detection_time: Duration,
+    /// Making factors and columns.
+    pub factor_time: Duration,
+    /// Prediction, global iterations and contact problems.
+    pub solve_time: Duration,
+    /// Storing states and handing over reactions.
+    pub advance_time: Duration,
+}
+
+impl DeformableCounters {
+    /// Time of the whole step without rapier's own.
+    pub fn total_time(&self) -> Duration {
+        self.detection_time + self.factor_time + self.solve_time + self.advance_time
+    }
+}

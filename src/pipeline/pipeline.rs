@@ -1,0 +1,340 @@
+//! The step.
+//!
+//! ```text
+//! read_obstacles → predict → detect → prepare_factors → form_islands → solve → advance
+//! → write_reactions → (rapier steps) → take_back_reactions
+//! ```
+
+use super::contacts::DeformableContact;
+use super::parameters::{DeformableCounters, DeformableParameters};
+use super::threads::for_each;
+use super::work::{BodyWork, IslandWork};
+use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet};
+use crate::contact::{Candidates, Side};
+use crate::coupling::{RapierScene, RapierSets, Reactions};
+use crate::error::DeformableBodyError;
+use crate::math::{Vec3, from_real, to_real};
+use crate::solver::{FactorCache, FactorKey, Reaction};
+use rapier3d::dynamics::{MultibodyJointSet, RigidBodySet};
+use rapier3d::geometry::ColliderSet;
+use rapier3d::math::Vector;
+use std::collections::HashMap;
+use std::time::{Duration, Instant};
+
+/// Steps deformable bodies beside rapier: for games with their own loop and sets. Holds memory and
+/// caches only: a fresh pipeline goes on with the same bits.
+///
+/// Call [`DeformablePipeline::before_step`], step rapier, then [`DeformablePipeline::after_step`],
+/// all with the same `dt`.
+#[derive(Default)]
+pub struct DeformablePipeline {
+    scene: RapierScene,
+    candidates: Candidates,
+    idle: HashMap<DeformableBodyHandle, BodyWork>,
+    works: Vec<BodyWork>,
+    factors: FactorCache,
+    islands: Vec<IslandWork>,
+    reaction_list: Vec<Reaction>,
+    reactions: Reactions,
+    contacts: Vec<DeformableContact>,
+    counters: DeformableCounters,
+}
+
+impl DeformablePipeline {
+    /// An empty pipeline.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Steps all bodies of `deformables` by `dt` [s] under `gravity` [m/s²] and hands rapier what
+    /// they do to its bodies. Never fails: a `dt` that is not positive and finite, or a gravity that
+    /// is not finite, skips the step ([`DeformableCounters::skipped`]).
+    pub fn before_step(
+        &mut self,
+        parameters: &DeformableParameters,
+        gravity: Vector,
+        dt: f32,
+        deformables: &mut DeformableBodySet,
+        bodies: &mut RigidBodySet,
+        colliders: &ColliderSet,
+        multibody_joints: &MultibodyJointSet,
+    ) {
+        self.counters = DeformableCounters::default();
+        self.contacts.clear();
+        if !(dt.is_finite() && dt > 0.0 && gravity.is_finite()) {
+            self.counters.skipped = true;
+            return;
+        }
+        let h = f64::from(dt);
+        let sets = RapierSets {
+            bodies,
+            colliders,
+            multibody_joints,
+        };
+        let mut clock = Clock::start();
+        self.read_obstacles(sets, gravity, h);
+        self.predict(deformables, gravity, h);
+        self.detect(deformables, sets);
+        self.counters.detection_time = clock.lap();
+        self.prepare_factors(deformables, h, parameters.column_budget);
+        self.form_islands();
+        self.counters.factor_time = clock.lap();
+        self.solve(parameters, h);
+        self.counters.solve_time = clock.lap();
+        self.advance(deformables, h);
+        self.write_reactions(bodies, gravity, dt);
+        self.counters.advance_time = clock.lap();
+    }
+
+    /// Puts the users' forces on rapier's bodies back. To be called after rapier's step.
+    pub fn after_step(&mut self, bodies: &mut RigidBodySet) {
+        self.reactions.take_back(bodies);
+    }
+
+    /// Makes factors, and columns for contact anywhere on the surface, ahead of time.
+    ///
+    /// # Errors
+    /// [`DeformableBodyError::TimeStep`].
+    pub fn prepare(&mut self, deformables: &DeformableBodySet, dt: f32) -> Result<(), DeformableBodyError> {
+        let h = f64::from(dt);
+        if !(h.is_finite() && h > 0.0) {
+            return Err(DeformableBodyError::TimeStep { dt: h });
+        }
+        for (_, body) in deformables.iter().filter(|(_, b)| b.is_enabled()) {
+            let all = 0..body.model.surface.nodes.len() as u32;
+            self.factors.prepare(&FactorKey::new(body, h), body, h, all);
+        }
+        Ok(())
+    }
+
+    /// Contacts of the last step.
+    pub fn contacts(&self) -> &[DeformableContact] {
+        &self.contacts
+    }
+
+    /// What the last step did.
+    pub fn counters(&self) -> &DeformableCounters {
+        &self.counters
+    }
+
+    fn read_obstacles(&mut self, sets: RapierSets<'_>, gravity: Vector, h: f64) {
+        self.scene.read(sets, gravity, h);
+        self.candidates.update(&self.scene.obstacles);
+        self.counters.obstacles = self.scene.obstacles.len();
+    }
+
+    fn predict(&mut self, deformables: &mut DeformableBodySet, gravity: Vector, h: f64) {
+        for (handle, body) in deformables.iter_mut() {
+            if !body.is_enabled() {
+                continue;
+            }
+            if !body.state.is_finite() {
+                quarantine(body, &mut self.counters);
+                continue;
+            }
+            let work = self.idle.remove(&handle);
+            self.works.push(work.unwrap_or_else(|| BodyWork::new(handle)));
+        }
+        // What is left belongs to bodies that were removed or disabled.
+        self.idle.clear();
+        let (set, gravity) = (&*deformables, from_real(gravity));
+        for_each(&mut self.works, |work| work.predict(&set[work.handle], h, &gravity));
+        self.counters.bodies = self.works.len();
+    }
+
+    fn detect(&mut self, deformables: &DeformableBodySet, sets: RapierSets<'_>) {
+        let (scene, candidates) = (&self.scene, &self.candidates);
+        let mut numbered: Vec<(usize, &mut BodyWork)> = self.works.iter_mut().enumerate().collect();
+        for_each(&mut numbered, |(index, work)| {
+            let body = &deformables[work.handle];
+            work.detect(*index, body, scene, candidates, sets);
+        });
+        self.counters.pairs = self.works.iter().map(|w| w.pairs).sum();
+        self.counters.contacts = self.works.iter().map(|w| w.rows.len()).sum();
+    }
+
+    fn prepare_factors(&mut self, deformables: &DeformableBodySet, h: f64, column_budget: usize) {
+        self.factors.begin_step(column_budget);
+        for work in &self.works {
+            let Some(problem) = &work.problem else { continue };
+            let body = &deformables[work.handle];
+            let done = self.factors.prepare(&problem.key, body, h, work.touched_nodes());
+            let done = done.unwrap_or_default();
+            self.counters.factorizations += done.factorizations;
+            self.counters.columns += done.columns;
+        }
+        self.counters.factor_bytes = self.factors.factor_bytes();
+        self.counters.column_bytes = self.factors.column_bytes();
+    }
+
+    /// Bodies that share a yielding partner are solved together.
+    fn form_islands(&mut self) {
+        let mut root: Vec<usize> = (0..self.works.len()).collect();
+        let mut first_on_partner: HashMap<u32, usize> = HashMap::new();
+        for (index, work) in self.works.iter().enumerate() {
+            for side in work.rows.iter().flat_map(|row| &row.sides) {
+                let Side::Partner { partner, .. } = side else { continue };
+                if self.scene.partners[partner.0 as usize].yields() {
+                    let other = *first_on_partner.entry(partner.0).or_insert(index);
+                    let (a, b) = (find(&mut root, other), find(&mut root, index));
+                    root[a.max(b)] = a.min(b);
+                }
+            }
+        }
+        let mut island_of_root: HashMap<usize, usize> = HashMap::new();
+        for island in &mut self.islands {
+            island.members.clear();
+            island.island.contacts.rows.clear();
+        }
+        let mut count = 0;
+        for index in 0..self.works.len() {
+            let key = find(&mut root, index);
+            let place = *island_of_root.entry(key).or_insert_with(|| {
+                count += 1;
+                count - 1
+            });
+            if place == self.islands.len() {
+                self.islands.push(IslandWork::default());
+            }
+            let island = &mut self.islands[place];
+            let local = island.members.len();
+            island.members.push(index);
+            let work = &mut self.works[index];
+            island.island.bodies.extend(work.problem.take());
+            for mut row in work.rows.drain(..) {
+                for side in &mut row.sides {
+                    if let Side::Soft { body, .. } = side {
+                        *body = local;
+                    }
+                }
+                island.island.contacts.rows.push(row);
+            }
+        }
+        self.islands.truncate(count);
+        self.counters.islands = count;
+    }
+
+    fn solve(&mut self, parameters: &DeformableParameters, h: f64) {
+        let limits = parameters.contact_limits();
+        let (factors, partners) = (&self.factors, &self.scene.partners);
+        for_each(&mut self.islands, |work| work.island.solve(factors, partners, h, &limits));
+        for report in self.islands.iter().map(|work| work.island.report) {
+            self.counters.iterations += report.iterations;
+            self.counters.newton_steps += report.newton_steps;
+            self.counters.contact_factorizations += report.cone_factorizations;
+            self.counters.contact_failures += report.cone_failures;
+        }
+    }
+
+    fn advance(&mut self, deformables: &mut DeformableBodySet, h: f64) {
+        self.reaction_list.clear();
+        self.reaction_list.resize(self.scene.partners.len(), Reaction::default());
+        for work in &mut self.islands {
+            let finite = work.is_finite();
+            for (local, &index) in work.members.iter().enumerate() {
+                let handle = self.works[index].handle;
+                let Some(body) = deformables.get_mut(handle) else { continue };
+                if finite {
+                    store(body, work, local, h, &mut self.counters);
+                } else if !work.island.bodies[local].current.x.iter().all(|x| x.iter().all(|c| c.is_finite()))
+                    || work.island.report.unsolvable
+                {
+                    quarantine(body, &mut self.counters);
+                }
+            }
+            if finite {
+                let contacts = &work.island.contacts;
+                contacts.add_reactions(&self.scene.partners, h, &mut self.reaction_list);
+                let handle_of = |local: usize| self.works[work.members[local]].handle;
+                list_contacts(work, &self.scene, handle_of, &mut self.contacts);
+            }
+            for (problem, &index) in work.island.bodies.drain(..).zip(&work.members) {
+                self.works[index].problem = Some(problem);
+            }
+        }
+        self.counters.active_contacts = self.contacts.iter().filter(|c| c.force != Vector::ZERO).count();
+        self.idle.extend(self.works.drain(..).map(|work| (work.handle, work)));
+    }
+
+    fn write_reactions(&mut self, bodies: &mut RigidBodySet, gravity: Vector, dt: f32) {
+        self.reactions.write(bodies, gravity, dt, &self.scene.handles, &self.reaction_list);
+    }
+}
+
+/// Puts a body aside whose state is not finite; it stays where it last was.
+fn quarantine(body: &mut DeformableBody, counters: &mut DeformableCounters) {
+    body.set_enabled(false);
+    body.report.quarantined = true;
+    counters.quarantined += 1;
+}
+
+fn store(body: &mut DeformableBody, work: &IslandWork, local: usize, h: f64, counters: &mut DeformableCounters) {
+    let problem = &work.island.bodies[local];
+    for ((v, x), (new, old)) in body
+        .state
+        .v
+        .iter_mut()
+        .zip(&mut body.state.x)
+        .zip(problem.current.x.iter().zip(&problem.x_start))
+    {
+        *v = (new - old) / h;
+        *x = *new;
+    }
+    for pin in &mut body.pins {
+        pin.force = problem.pin_force(pin.node as usize);
+    }
+    work.memory_of(local, h, &mut body.state.contacts);
+    body.report.iterations = work.island.report.iterations;
+    body.report.residual = problem.residual();
+    body.report.tolerance = problem.settings.tolerance * problem.force_scale();
+    body.report.guard_retries = problem.guard_retries;
+    counters.guard_retries += problem.guard_retries;
+    counters.not_converged += usize::from(!body.last_converged());
+}
+
+fn list_contacts(
+    work: &IslandWork,
+    scene: &RapierScene,
+    handle_of: impl Fn(usize) -> DeformableBodyHandle,
+    contacts: &mut Vec<DeformableContact>,
+) {
+    let system = &work.island.contacts;
+    for (i, row) in system.rows.iter().enumerate() {
+        let [Side::Soft { body, .. }, Side::Partner { point, .. }] = &row.sides else {
+            continue;
+        };
+        let normal: &Vec3 = &row.frame[0];
+        contacts.push(DeformableContact {
+            body: handle_of(*body),
+            collider: scene.collider_of(row.key.obstacle),
+            point: to_real(point),
+            normal: to_real(normal),
+            force: to_real(&system.force(i)),
+            gap: system.final_gap(i),
+        });
+    }
+}
+
+fn find(root: &mut [usize], i: usize) -> usize {
+    let mut at = i;
+    while root[at] != at {
+        root[at] = root[root[at]];
+        at = root[at];
+    }
+    at
+}
+
+struct Clock(Instant);
+
+impl Clock {
+    fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    fn lap(&mut self) -> Duration {
+        let now = Instant::now();
+        let lap = now - self.0;
+        self.0 = now;
+        lap
+    }
+}

@@ -1,0 +1,125 @@
+//! What the pipeline keeps per body from step to step: memory only, nothing that results depend on.
+
+use crate::body::{ContactKey, ContactMemory, DeformableBody, DeformableBodyHandle};
+use crate::contact::{Candidates, Detector, Pair, Row, Side};
+use crate::coupling::{RapierScene, RapierSets, combined};
+use crate::math::Vec3;
+use crate::solver::{BodyProblem, Island};
+
+/// One body within a step.
+pub(super) struct BodyWork {
+    pub handle: DeformableBodyHandle,
+    /// `None` while an island has it.
+    pub problem: Option<BodyProblem>,
+    pub rows: Vec<Row>,
+    pub pairs: usize,
+    detector: Detector,
+    near: Vec<u32>,
+}
+
+impl BodyWork {
+    pub fn new(handle: DeformableBodyHandle) -> Self {
+        Self {
+            handle,
+            problem: None,
+            rows: Vec::new(),
+            pairs: 0,
+            detector: Detector::default(),
+            near: Vec::new(),
+        }
+    }
+
+    /// Takes the body in: inertial target, masses, damping.
+    pub fn predict(&mut self, body: &DeformableBody, h: f64, gravity: &Vec3) {
+        match &mut self.problem {
+            Some(problem) if problem.model.id == body.model.id => problem.begin(body, h, gravity),
+            problem => *problem = Some(BodyProblem::new(body, h, gravity)),
+        }
+    }
+
+    /// Finds the body's contacts; `index` is its place in the step's list.
+    pub fn detect(
+        &mut self,
+        index: usize,
+        body: &DeformableBody,
+        scene: &RapierScene,
+        candidates: &Candidates,
+        sets: RapierSets<'_>,
+    ) {
+        self.rows.clear();
+        self.pairs = 0;
+        let Some(problem) = &self.problem else { return };
+        let (model, x) = (&problem.model, &problem.x_start);
+        self.detector.begin(model, x, &problem.target);
+        candidates.near(&self.detector.aabb(model, x), &mut self.near);
+        for &o in &self.near {
+            let collider = sets.colliders.get(scene.colliders[o as usize]);
+            let Some((friction, restitution)) = collider.and_then(|c| combined(body, c)) else {
+                continue;
+            };
+            let obstacle = &scene.obstacles[o as usize];
+            let pair = Pair {
+                body: index,
+                obstacle: o as usize,
+                friction,
+                restitution,
+            };
+            self.pairs += 1;
+            self.detector.detect(&pair, obstacle, model, x, &mut self.rows);
+        }
+        let pinned = |node: usize| problem.key.pins.binary_search(&(node as u32)).is_ok();
+        self.rows.retain_mut(|row| {
+            // Between a pinned node and what does not yield there is nothing to solve for.
+            let held = row.sides[0].soft_nodes().all(|(n, _)| pinned(n));
+            let yields = |side: &Side| match side {
+                Side::Partner { partner, .. } => scene.partners[partner.0 as usize].yields(),
+                Side::Soft { .. } => false,
+            };
+            if let Some(memory) = body.state.contact(&row.key) {
+                row.warm_force = memory.force;
+                row.warm_shift_rate = memory.shift_rate;
+            }
+            !held || row.sides.iter().any(yields)
+        });
+        self.rows.sort_by_key(|row| row.key);
+    }
+
+    /// Surface nodes (as indices into the model's list) that the contacts act on.
+    pub fn touched_nodes(&self) -> impl Iterator<Item = u32> + '_ {
+        let nodes = self.rows.iter().flat_map(|row| row.sides[0].soft_nodes());
+        let index = self.problem.as_ref().map(|p| &p.model.surface.index_of_node);
+        nodes.filter_map(move |(node, _)| Some(index?[node]))
+    }
+}
+
+/// An island with the places of its bodies in the step's list.
+#[derive(Default)]
+pub(super) struct IslandWork {
+    pub island: Island,
+    pub members: Vec<usize>,
+}
+
+impl IslandWork {
+    /// Whether every number that leaves the island is finite.
+    pub fn is_finite(&self) -> bool {
+        let finite = |v: &Vec3| v.iter().all(|c| c.is_finite());
+        !self.island.report.unsolvable
+            && self.island.bodies.iter().all(|b| b.current.x.iter().all(finite))
+            && self.island.contacts.lambda.iter().all(|l| l.is_finite())
+    }
+
+    /// What the contacts of a member leave to the next step, ascending by key.
+    pub fn memory_of(&self, member: usize, h: f64, memory: &mut Vec<ContactMemory>) {
+        memory.clear();
+        let contacts = &self.island.contacts;
+        for (i, row) in contacts.rows.iter().enumerate() {
+            let of_member = matches!(row.sides[0], Side::Soft { body, .. } if body == member);
+            let force = contacts.force(i);
+            if of_member && force != Vec3::zeros() {
+                let shift_rate = contacts.shift[i] / h;
+                let key: ContactKey = row.key;
+                memory.push(ContactMemory { key, force, shift_rate });
+            }
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Deformable bodies beside a rapier `PhysicsWorld`.
+
+use super::contacts::DeformableContact;
+use super::parameters::{DeformableCounters, DeformableParameters};
+use super::pipeline::DeformablePipeline;
+use crate::body::{DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet};
+use crate::error::DeformableBodyError;
+use rapier3d::geometry::ColliderHandle;
+use rapier3d::math::Vector;
+use rapier3d::pipeline::{EventHandler, PhysicsHooks, PhysicsWorld};
+
+/// All deformable bodies of a scene, stepped together with a rapier world. `dt` and gravity are the
+/// rapier world's: one truth.
+///
+/// ```
+/// use foible3d::prelude::*;
+/// use rapier3d::prelude::*;
+/// let mut physics = PhysicsWorld::new();
+/// let (_, floor) = physics.insert(RigidBodyBuilder::fixed(), ColliderBuilder::cuboid(2.0, 0.1, 2.0));
+/// let mut deformables = DeformableWorld::new();
+/// let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [3, 3, 3]).translation(Vector::Y * 0.31);
+/// let cube = deformables.insert(cube.material(DeformableMaterial::new(1.0e5, 0.3).mass_damping(2.0)))?;
+/// for _ in 0..180 {
+///     deformables.step(&mut physics);
+/// }
+/// let carried = deformables.contact_force(cube, floor);
+/// assert!((carried.y - 64.0 * 9.81).abs() < 0.1);
+/// # Ok::<(), DeformableBodyError>(())
+/// ```
+#[derive(Default)]
+pub struct DeformableWorld {
+    /// The bodies.
+    pub bodies: DeformableBodySet,
+    /// World-wide parameters.
+    pub parameters: DeformableParameters,
+    /// Memory and caches of the step.
+    pub pipeline: DeformablePipeline,
+}
+
+impl DeformableWorld {
+    /// An empty world.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Builds a body and takes it in.
+    ///
+    /// # Errors
+    /// As [`DeformableBodyBuilder::build`].
+    pub fn insert(
+        &mut self,
+        builder: DeformableBodyBuilder,
+    ) -> Result<DeformableBodyHandle, DeformableBodyError> {
+        self.bodies.insert(builder)
+    }
+
+    /// Takes a body out.
+    ///
+    /// # Errors
+    /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody).
+    pub fn remove(&mut self, handle: DeformableBodyHandle) -> Result<DeformableBody, DeformableBodyError> {
+        self.bodies.remove(handle)
+    }
+
+    /// Makes factors and contact columns for the coming steps ahead of time, so that a first touch
+    /// takes no longer than a later one.
+    pub fn prepare(&mut self, physics: &PhysicsWorld) -> Result<(), DeformableBodyError> {
+        self.pipeline.prepare(&self.bodies, physics.integration_parameters.dt)
+    }
+
+    /// One step: deformables, reactions, then rapier.
+    pub fn step(&mut self, physics: &mut PhysicsWorld) {
+        self.step_with_events(physics, &(), &());
+    }
+
+    /// One step, with rapier's hooks and event handler passed on to it.
+    pub fn step_with_events(
+        &mut self,
+        physics: &mut PhysicsWorld,
+        hooks: &dyn PhysicsHooks,
+        events: &dyn EventHandler,
+    ) {
+        self.pipeline.before_step(
+            &self.parameters,
+            physics.gravity,
+            physics.integration_parameters.dt,
+            &mut self.bodies,
+            &mut physics.bodies,
+            &physics.colliders,
+            &physics.multibody_joints,
+        );
+        physics.step_with_events(hooks, events);
+        self.pipeline.after_step(&mut physics.bodies);
+    }
+
+    /// Contacts of the last step.
+    pub fn contacts(&self) -> &[DeformableContact] {
+        self.pipeline.contacts()
+    }
+
+    /// Contacts of the last step with one collider.
+    pub fn contacts_with(&self, collider: ColliderHandle) -> impl Iterator<Item = &DeformableContact> {
+        self.contacts().iter().filter(move |c| c.collider == collider)
+    }
+
+    /// Contacts of the last step of one body.
+    pub fn contacts_of(&self, body: DeformableBodyHandle) -> impl Iterator<Item = &DeformableContact> {
+        self.contacts().iter().filter(move |c| c.body == body)
+    }
+
+    /// Force [N] of a collider on a body in the last step.
+    pub fn contact_force(&self, body: DeformableBodyHandle, collider: ColliderHandle) -> Vector {
+        let pair = self.contacts_of(body).filter(|c| c.collider == collider);
+        pair.map(|c| c.force).sum()
+    }
+
+    /// What the last step did, and how long it took.
+    pub fn counters(&self) -> &DeformableCounters {
+        self.pipeline.counters()
+    }
+}

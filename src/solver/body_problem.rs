@@ -1,0 +1,291 @@
+//! One body within a step: its objective, its start, its residual.
+//!
+//! The step minimises `Ψ(x) = 1/(2h²)‖x − s‖²_M + α/(2h)‖x − x_n‖²_M + E(x)`, with
+//! `s = x_n + h v_n + h² M⁻¹ f_ext` [Bouaziz et al. 2014], E the elastic energy with the stiffness
+//! damping of the step. The residual is `r = −∂Ψ/∂x` [N]; pinned nodes are not unknowns.
+
+use super::factor_cache::SystemFactor;
+use super::metric::Metric;
+use super::system::FactorKey;
+use crate::body::elastic::{self, StiffnessDamping};
+use crate::body::{DeformableBody, DeformableModel, Frames, SolverSettings, SystemMatrix};
+use crate::material::DeformableMaterial;
+use crate::math::{Mat3, Vec3};
+use std::sync::Arc;
+
+/// Largest rotation of an element against the body's frame for which one frame serves.
+const FLOATING_LIMIT: f64 = 20.0 * std::f64::consts::PI / 180.0;
+
+/// A body's step in the making.
+pub(crate) struct BodyProblem {
+    pub key: FactorKey,
+    pub model: Arc<DeformableModel>,
+    pub settings: SolverSettings,
+    material: DeformableMaterial,
+    h: f64,
+    /// Positions at the start of the step.
+    pub x_start: Vec<Vec3>,
+    pub v_start: Vec<Vec3>,
+    /// Where the nodes would go without internal and contact forces.
+    pub target: Vec<Vec3>,
+    masses: Vec<f64>,
+    damping: StiffnessDamping,
+    pub current: Iterate,
+    pub trial: Iterate,
+    /// Contact forces on the nodes [N].
+    pub contact_force: Vec<Vec3>,
+    pub metric: Metric,
+    /// Factor c ≥ 1 on A, raised by the guard.
+    pub scaling: f64,
+    pub guard_retries: usize,
+    /// A force that counts as large for this body [N].
+    pub weight: f64,
+    step: Vec<Vec3>,
+}
+
+/// A point of the iteration with what was evaluated there.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Iterate {
+    pub x: Vec<Vec3>,
+    /// Residual [N]; at pinned nodes minus the force of the pin.
+    pub r: Vec<Vec3>,
+    /// Ψ [J].
+    pub objective: f64,
+    /// Sum of the sizes of Ψ's terms [J], for its rounding.
+    pub magnitude: f64,
+    /// Largest internal force on a node [N].
+    pub internal: f64,
+}
+
+impl BodyProblem {
+    /// Takes in a body at the start of a step of `h` [s] under `gravity` [m/s²].
+    pub fn new(body: &DeformableBody, h: f64, gravity: &Vec3) -> Self {
+        let n = body.state.x.len();
+        let mut problem = Self {
+            key: FactorKey::new(body, h),
+            model: body.model.clone(),
+            settings: *body.settings(),
+            material: body.material,
+            h,
+            x_start: Vec::new(),
+            v_start: Vec::new(),
+            target: Vec::new(),
+            masses: Vec::new(),
+            damping: StiffnessDamping::default(),
+            current: Iterate::default(),
+            trial: Iterate::default(),
+            contact_force: vec![Vec3::zeros(); n],
+            metric: Metric::default(),
+            scaling: 1.0,
+            guard_retries: 0,
+            weight: 0.0,
+            step: vec![Vec3::zeros(); n],
+        };
+        problem.begin(body, h, gravity);
+        problem
+    }
+
+    /// As [`BodyProblem::new`], in the memory of an earlier step.
+    pub fn begin(&mut self, body: &DeformableBody, h: f64, gravity: &Vec3) {
+        let n = body.state.x.len();
+        self.key = FactorKey::new(body, h);
+        self.settings = *body.settings();
+        self.material = body.material;
+        self.h = h;
+        self.scaling = 1.0;
+        self.guard_retries = 0;
+        self.x_start.clone_from(&body.state.x);
+        self.v_start.clone_from(&body.state.v);
+        self.masses.clear();
+        self.masses.extend((0..n).map(|i| body.node_mass(i)));
+        let g = gravity * body.gravity_scale();
+        self.target.clear();
+        let to_target = |i: usize| {
+            let acceleration = g + body.forces.get(i).map_or(Vec3::zeros(), |f| f / self.masses[i]);
+            body.state.x[i] + body.state.v[i] * h + acceleration * (h * h)
+        };
+        self.target.extend((0..n).map(to_target));
+        for pin in &body.pins {
+            self.target[pin.node as usize] = pin.target;
+        }
+        self.contact_force.clear();
+        self.contact_force.resize(n, Vec3::zeros());
+        self.step.resize(n, Vec3::zeros());
+        self.damping.begin(&self.model, self.material.stiffness_damping, h, &body.state.x);
+        let mass = self.masses.iter().sum::<f64>();
+        self.weight = mass * g.norm() / n as f64;
+    }
+
+    /// Chooses where the iteration starts, and the frames of the metric: the rigidly extrapolated
+    /// shape or the inertial target, whichever has the lower Ψ.
+    pub fn choose_start(&mut self, factor: &SystemFactor) {
+        let model = self.model.clone();
+        let (turned, _, centre) = elastic::floating_frame(&model, &self.target);
+        let (before, _, centre_before) = elastic::floating_frame(&model, &self.x_start);
+        let turn = turned * before.transpose();
+        self.current.x.clear();
+        let carried = self.x_start.iter().map(|x| centre + turn * (x - centre_before));
+        self.current.x.extend(carried);
+        if !self.key.pins.is_empty() {
+            // Shift so that the pinned nodes fit on average, then put them where they belong.
+            let miss = |&p: &u32| self.target[p as usize] - self.current.x[p as usize];
+            let shift = self.key.pins.iter().map(miss).sum::<Vec3>() / self.key.pins.len() as f64;
+            self.current.x.iter_mut().for_each(|x| *x += shift);
+            for &p in &self.key.pins {
+                self.current.x[p as usize] = self.target[p as usize];
+            }
+        }
+        self.evaluate_current();
+        self.trial.x.clone_from(&self.target);
+        self.evaluate_trial();
+        // Written so that a non-finite extrapolation loses.
+        if !(self.current.objective <= self.trial.objective) {
+            self.accept_trial();
+        }
+        self.choose_frames(&turned, factor);
+    }
+
+    fn choose_frames(&mut self, turned: &Mat3, factor: &SystemFactor) {
+        if factor.system == SystemMatrix::Laplacian {
+            return self.metric.set_isotropic();
+        }
+        let per_node = match self.settings.frames {
+            Frames::Floating => false,
+            Frames::PerNode => true,
+            Frames::Automatic => self.bends_beyond(turned, FLOATING_LIMIT),
+        };
+        if per_node {
+            let mobility = self.h * self.h / (1.0 + self.material.mass_damping * self.h);
+            let (x, masses) = (&self.current.x, &self.masses);
+            self.metric.set_per_node(&self.model, x, masses, mobility, &self.key, factor);
+        } else {
+            self.metric.set_floating(turned);
+        }
+    }
+
+    /// Whether some element has turned by more than `limit` [rad] against the frame.
+    fn bends_beyond(&self, frame: &Mat3, limit: f64) -> bool {
+        let least = 1.0 + 2.0 * limit.cos();
+        elastic::element_rotations(&self.model, &self.current.x).any(|(_, rotations)| {
+            (0..crate::math::lanes::LANES).any(|i| frame.dot(&rotations.lane(i)) < least)
+        })
+    }
+
+    /// Sets the trial to `x + P r/c`.
+    pub fn free_step(&mut self, factor: &SystemFactor) {
+        self.trial.x.clone_from(&self.current.x);
+        self.metric.apply(factor, &self.current.r, &mut self.step);
+        self.add_step();
+    }
+
+    /// Adds `P Jᵀλ/c` to the trial.
+    pub fn contact_step(&mut self, factor: &SystemFactor) {
+        self.metric.apply(factor, &self.contact_force, &mut self.step);
+        self.add_step();
+    }
+
+    /// Sets the trial to `x + step/c`.
+    pub fn set_trial(&mut self, step: &[Vec3]) {
+        self.step.copy_from_slice(step);
+        self.trial.x.clone_from(&self.current.x);
+        self.add_step();
+    }
+
+    /// Pinned nodes are rows of the identity in A, without neighbours: what the solve says of them
+    /// is no motion.
+    fn add_step(&mut self) {
+        self.key.pins.iter().for_each(|&p| self.step[p as usize] = Vec3::zeros());
+        let scale = 1.0 / self.scaling;
+        for (x, d) in self.trial.x.iter_mut().zip(&self.step) {
+            *x += d * scale;
+        }
+    }
+
+    /// The residual, zero at pinned nodes [N].
+    pub fn free_residual(&self) -> Vec<Vec3> {
+        let mut r = self.current.r.clone();
+        self.key.pins.iter().for_each(|&p| r[p as usize] = Vec3::zeros());
+        r
+    }
+
+    /// `P f` [m].
+    pub fn preconditioned(&mut self, f: &[Vec3], factor: &SystemFactor) -> Vec<Vec3> {
+        let mut out = vec![Vec3::zeros(); f.len()];
+        self.metric.apply(factor, f, &mut out);
+        out
+    }
+
+    /// Force [N] with which a pin holds its node.
+    pub fn pin_force(&self, node: usize) -> Vec3 {
+        -(self.current.r[node] + self.contact_force[node])
+    }
+
+    pub fn evaluate_current(&mut self) {
+        let mut iterate = std::mem::take(&mut self.current);
+        self.evaluate(&mut iterate);
+        self.current = iterate;
+    }
+
+    pub fn evaluate_trial(&mut self) {
+        let mut iterate = std::mem::take(&mut self.trial);
+        self.evaluate(&mut iterate);
+        self.trial = iterate;
+    }
+
+    fn evaluate(&self, at: &mut Iterate) {
+        at.r.clear();
+        at.r.resize(at.x.len(), Vec3::zeros());
+        let elastic = elastic::add_forces(&self.model, &self.material, &self.damping, &at.x, &mut at.r);
+        at.internal = at.r.iter().map(|f| f.amax()).fold(0.0, f64::max);
+        let (inertia, drag) = (1.0 / (self.h * self.h), self.material.mass_damping / self.h);
+        let mut kinetic = 0.0;
+        for i in 0..at.x.len() {
+            let (from_target, moved) = (self.target[i] - at.x[i], at.x[i] - self.x_start[i]);
+            let m = self.masses[i];
+            at.r[i] += (from_target * inertia - moved * drag) * m;
+            kinetic += m * (inertia * from_target.norm_squared() + drag * moved.norm_squared());
+        }
+        at.objective = elastic + 0.5 * kinetic;
+        at.magnitude = elastic + 0.5 * kinetic;
+    }
+
+    /// The guard [cf. Nocedal & Wright 2006, sufficient decrease]:
+    /// `Ψ(x + d) − λᵀJd ≤ Ψ(x) − 0.1·dᵀ(r + Jᵀλ)`.
+    pub fn trial_descends(&self) -> bool {
+        let (mut by_contact, mut by_residual) = (0.0, 0.0);
+        for i in 0..self.trial.x.len() {
+            let d = self.trial.x[i] - self.current.x[i];
+            by_contact += d.dot(&self.contact_force[i]);
+            by_residual += d.dot(&self.current.r[i]);
+        }
+        let promised = 0.1 * (by_contact + by_residual);
+        // Ψ is a sum over the elements: its rounding is below 1e-13 of its terms.
+        let rounding = 1e-12 * (self.trial.magnitude + self.current.magnitude + by_contact.abs());
+        self.trial.objective - by_contact <= self.current.objective - promised + rounding
+    }
+
+    pub fn accept_trial(&mut self) {
+        std::mem::swap(&mut self.current, &mut self.trial);
+    }
+
+    /// Largest component of `r + Jᵀλ` over the free nodes [N].
+    pub fn residual(&self) -> f64 {
+        let mut largest = 0.0_f64;
+        let mut pins = self.key.pins.iter().peekable();
+        for i in 0..self.current.r.len() {
+            if pins.next_if(|&&p| p as usize == i).is_some() {
+                continue;
+            }
+            let size = (self.current.r[i] + self.contact_force[i]).amax();
+            // NaN must not vanish in a maximum.
+            largest = if size.is_nan() { f64::INFINITY } else { largest.max(size) };
+        }
+        largest
+    }
+
+    /// The force that residuals are measured by [N].
+    pub fn force_scale(&self) -> f64 {
+        let contact = self.contact_force.iter().map(|f| f.amax()).fold(0.0, f64::max);
+        self.weight.max(self.current.internal).max(contact)
+    }
+}

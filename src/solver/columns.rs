@@ -1,0 +1,101 @@
+//! Columns of `A⁻¹` over the surface nodes, made when a node first comes near a contact.
+//!
+//! Of each column only the rows of surface nodes are kept, in `f32`: contacts need no more, and the
+//! residual that they are judged by is `f64`. Blocks are in the rest frame; frames rotate them.
+
+use super::factor::{BATCH, Factor, FactorScratch, Symbolic};
+use super::system::dimension;
+use crate::body::{DeformableModel, SystemMatrix};
+use crate::math::Mat3;
+use crate::mesh::Surface;
+
+/// The surface block of an inverse, as far as it has been asked for.
+#[derive(Debug)]
+pub(crate) struct Columns {
+    /// Unknowns per node.
+    d: usize,
+    /// Per surface node: `d` columns of `d·|S|` numbers.
+    columns: Vec<Option<Box<[f32]>>>,
+    made: usize,
+}
+
+impl Columns {
+    pub fn new(surface: &Surface, system: SystemMatrix) -> Self {
+        Self {
+            d: dimension(system),
+            columns: vec![None; surface.nodes.len()],
+            made: 0,
+        }
+    }
+
+    /// Makes the columns at these surface nodes (indices into `Surface::nodes`) that are not there
+    /// yet; returns how many nodes that were.
+    pub fn prepare(
+        &mut self,
+        model: &DeformableModel,
+        pins: &[u32],
+        symbolic: &Symbolic,
+        factor: &Factor,
+        surface_nodes: impl Iterator<Item = u32>,
+        scratch: &mut FactorScratch,
+    ) -> usize {
+        let mut missing: Vec<u32> = surface_nodes
+            .filter(|&s| self.columns[s as usize].is_none())
+            .collect();
+        missing.sort_unstable();
+        missing.dedup();
+        let (d, nodes) = (self.d, &model.surface.nodes);
+        let n = d * model.rest.len();
+        let mut batch = Vec::new();
+        for chunk in missing.chunks(BATCH / d) {
+            batch.clear();
+            batch.resize(n * BATCH, 0.0);
+            for (k, &s) in chunk.iter().enumerate() {
+                for c in 0..d {
+                    batch[n * (d * k + c) + d * nodes[s as usize] as usize + c] = 1.0;
+                }
+            }
+            symbolic.solve(factor, &mut batch, BATCH, scratch);
+            for (k, &s) in chunk.iter().enumerate() {
+                // A pinned node does not move: its column is zero, not that of its identity row.
+                if pins.binary_search(&nodes[s as usize]).is_ok() {
+                    self.columns[s as usize] = Some(vec![0.0; d * d * nodes.len()].into());
+                    continue;
+                }
+                let column = |c: usize| &batch[n * (d * k + c)..][..n];
+                let kept = (0..d).flat_map(|c| {
+                    nodes.iter().flat_map(move |&i| (0..d).map(move |r| column(c)[d * i as usize + r] as f32))
+                });
+                self.columns[s as usize] = Some(kept.collect());
+            }
+        }
+        self.made += missing.len();
+        missing.len()
+    }
+
+    /// The 3×3 block of `A⁻¹` between two surface nodes whose columns were prepared. Symmetric to
+    /// the last bit: always read from the column of the larger index.
+    pub fn block(&self, i: usize, j: usize) -> Mat3 {
+        if i > j {
+            return self.block(j, i).transpose();
+        }
+        let Some(column) = &self.columns[j] else {
+            return Mat3::zeros();
+        };
+        if self.d == 1 {
+            return Mat3::from_diagonal_element(column[i] as f64);
+        }
+        let stride = 3 * self.columns.len();
+        let block = Mat3::from_fn(|r, c| column[stride * c + 3 * i + r] as f64);
+        if i == j { (block + block.transpose()) * 0.5 } else { block }
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.made * self.columns.len() * self.d * self.d * size_of::<f32>()
+    }
+
+    pub fn clear(&mut self) {
+        self.columns.fill(None);
+        self.made = 0;
+    }
+}

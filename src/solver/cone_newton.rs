@@ -1,0 +1,347 @@
+//! The contact problem: forces λ in Coulomb cones that keep gaps open.
+//!
+//! `ĝ(λ) = g₀ + Wλ + (σ, 0, 0) − R(λ⁰ − λ)`, with σ = μ‖slip‖ the De Saxcé shift [De Saxcé & Feng
+//! 1998] and a proximal term around λ⁰, R = ε·max(W_nn, W_tt): at the fixed point λ = λ⁰ it cancels.
+//! With the projection γ(z) of −ĝ/R onto the cones, a globalised Newton method minimises the convex
+//! `f(z) = ½zᵀWz + ½γᵀRγ`, `∇f = W(z − γ)`, in the family of SAP [Castro et al. 2022].
+
+use super::factor::DenseFactor;
+use crate::contact::cone;
+
+/// The data of one problem. `dims[i]` is 3, or 1 without friction; everything else is packed by it.
+#[derive(Default)]
+pub(crate) struct ConeProblem {
+    /// First row of each contact, and the number of rows last.
+    pub offsets: Vec<usize>,
+    pub friction: Vec<f64>,
+    /// Delassus operator [m/N], dense, symmetric.
+    pub W: Vec<f64>,
+    /// Gaps and slips without contact forces [m], the shift included in the normal ones.
+    pub g: Vec<f64>,
+}
+
+/// How hard to try.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ConeTolerance {
+    /// Of `‖z − γ‖∞` relative to the largest force.
+    pub relative: f64,
+    /// The force that counts as large where there is none [N].
+    pub floor: f64,
+}
+
+/// What a solve took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct ConeWork {
+    pub newton_steps: usize,
+    pub factorizations: usize,
+    pub failures: usize,
+}
+
+/// Proximal parameter of the result.
+const EPSILON: f64 = 1.0e-4;
+/// Newton steps that a warm start may take before the ladder is climbed.
+const WARM_STEPS: usize = 4;
+/// Newton steps on a rung of the ladder.
+const RUNG_STEPS: usize = 40;
+/// Rungs tried when warm start and short ladder failed.
+const LONG_LADDER: [f64; 7] = [1.0, 0.1, 1e-2, 3e-3, 1e-3, 3e-4, EPSILON];
+
+/// Solves cone problems; holds the memory for them.
+#[derive(Default)]
+pub(crate) struct ConeSolver {
+    z: Vec<f64>,
+    gamma: Vec<f64>,
+    u: Vec<f64>,
+    dz: Vec<f64>,
+    Wz: Vec<f64>,
+    Wdz: Vec<f64>,
+    center: Vec<f64>,
+    R: Vec<f64>,
+    columns: Vec<[[f64; 3]; 3]>,
+    column_offsets: Vec<usize>,
+    reduced: Vec<f64>,
+    hessian: DenseFactor,
+    /// The matrix that `hessian` was made of: equal bits, equal factor.
+    factored: Vec<f64>,
+    fresh: Vec<f64>,
+}
+
+impl ConeProblem {
+    pub fn rows(&self) -> usize {
+        self.offsets.last().copied().unwrap_or(0)
+    }
+
+    pub fn contacts(&self) -> usize {
+        self.friction.len()
+    }
+
+    fn w(&self, i: usize, j: usize) -> f64 {
+        self.W[j * self.rows() + i]
+    }
+
+    /// `out = W v`.
+    pub fn multiply(&self, v: &[f64], out: &mut Vec<f64>) {
+        let m = self.rows();
+        out.clear();
+        out.resize(m, 0.0);
+        for (column, &vj) in self.W.chunks_exact(m.max(1)).zip(v) {
+            if vj != 0.0 {
+                for (o, w) in out.iter_mut().zip(column) {
+                    *o += w * vj;
+                }
+            }
+        }
+    }
+}
+
+impl ConeSolver {
+    /// Improves `lambda` [N], which holds the proximal centre and the start, to the solution.
+    pub fn solve(&mut self, problem: &ConeProblem, lambda: &mut [f64], tolerance: ConeTolerance) -> ConeWork {
+        let mut work = ConeWork::default();
+        if problem.contacts() == 0 {
+            return work;
+        }
+        self.z.clear();
+        self.z.extend_from_slice(lambda);
+        let mut climb = |solver: &mut Self, rungs: &[(f64, usize)]| {
+            solver.z.clear();
+            solver.z.extend_from_slice(lambda);
+            solver.center.clear();
+            solver.center.extend_from_slice(lambda);
+            rungs.iter().all(|&(epsilon, steps)| {
+                let done = solver.minimise(problem, epsilon, steps, tolerance, &mut work);
+                solver.center.clone_from(&solver.gamma);
+                done
+            })
+        };
+        let done = climb(self, &[(EPSILON, WARM_STEPS)])
+            || climb(self, &[(1e-2, RUNG_STEPS), (EPSILON, RUNG_STEPS)])
+            || climb(self, &LONG_LADDER.map(|e| (e, RUNG_STEPS)));
+        if !done {
+            work.failures += 1;
+        }
+        if self.gamma.iter().all(|g| g.is_finite()) {
+            lambda.copy_from_slice(&self.gamma);
+        }
+        work
+    }
+
+    /// Newton's method at one ε, from z; leaves the force in γ.
+    fn minimise(
+        &mut self,
+        problem: &ConeProblem,
+        epsilon: f64,
+        steps: usize,
+        tolerance: ConeTolerance,
+        work: &mut ConeWork,
+    ) -> bool {
+        self.set_regularisation(problem, epsilon);
+        let mut z = std::mem::take(&mut self.z);
+        problem.multiply(&z, &mut self.Wz);
+        self.project(problem);
+        let mut done = false;
+        for step in 0..=steps {
+            let error = largest(z.iter().zip(&self.gamma).map(|(z, g)| z - g));
+            let scale = largest(self.gamma.iter().copied()).max(tolerance.floor);
+            done = error <= tolerance.relative * scale;
+            if done || step == steps || !error.is_finite() {
+                break;
+            }
+            work.newton_steps += 1;
+            if !self.newton_direction(problem, &z, work) {
+                break;
+            }
+            let dz = std::mem::take(&mut self.dz);
+            let mut Wdz = std::mem::take(&mut self.Wdz);
+            problem.multiply(&dz, &mut Wdz);
+            let t = self.line_search(problem, &z, &dz, &Wdz);
+            for k in 0..z.len() {
+                z[k] += t * dz[k];
+                self.Wz[k] += t * Wdz[k];
+            }
+            (self.dz, self.Wdz) = (dz, Wdz);
+            self.project(problem);
+        }
+        self.z = z;
+        done
+    }
+
+    fn set_regularisation(&mut self, problem: &ConeProblem, epsilon: f64) {
+        self.R.clear();
+        for i in 0..problem.contacts() {
+            let rows = problem.offsets[i]..problem.offsets[i + 1];
+            let stiffest = rows.map(|k| problem.w(k, k)).fold(0.0, f64::max);
+            // Rows that nothing yields to: any positive number keeps them harmless.
+            self.R.push(epsilon * stiffest.max(f64::MIN_POSITIVE.sqrt()));
+        }
+    }
+
+    /// u = −ĝ/R and γ = its projection, from `Wz`.
+    fn project(&mut self, problem: &ConeProblem) {
+        let m = problem.rows();
+        self.u.resize(m, 0.0);
+        self.gamma.resize(m, 0.0);
+        for i in 0..problem.contacts() {
+            let rows = problem.offsets[i]..problem.offsets[i + 1];
+            for k in rows.clone() {
+                self.u[k] = self.center[k] - (problem.g[k] + self.Wz[k]) / self.R[i];
+            }
+            let force = cone::project(spatial(&self.u[rows.clone()]), problem.friction[i]).force;
+            self.gamma[rows.clone()].copy_from_slice(&force[..rows.len()]);
+        }
+    }
+
+    /// `dz = b − L(I + LᵀWL)⁻¹LᵀWb`, b = γ − z.
+    fn newton_direction(&mut self, problem: &ConeProblem, z: &[f64], work: &mut ConeWork) -> bool {
+        self.dz.clear();
+        self.dz.extend(self.gamma.iter().zip(z).map(|(g, z)| g - z));
+        self.columns.resize(problem.contacts(), [[0.0; 3]; 3]);
+        self.column_offsets.clear();
+        self.column_offsets.push(0);
+        let mut size = 0;
+        for i in 0..problem.contacts() {
+            let u = spatial(&self.u[problem.offsets[i]..problem.offsets[i + 1]]);
+            size += cone::curvature_columns(u, problem.friction[i], self.R[i], &mut self.columns[i]);
+            self.column_offsets.push(size);
+        }
+        if size == 0 {
+            return true;
+        }
+        if !self.factor_hessian(problem, size, work) {
+            return false;
+        }
+        let mut Wb = std::mem::take(&mut self.Wdz);
+        problem.multiply(&self.dz, &mut Wb);
+        let mut reduced = std::mem::take(&mut self.reduced);
+        reduced.clear();
+        for i in 0..problem.contacts() {
+            let b = spatial(&Wb[problem.offsets[i]..problem.offsets[i + 1]]);
+            reduced.extend(self.columns_of(i).iter().map(|c| dot(c, &b)));
+        }
+        self.hessian.solve(&mut reduced);
+        let mut dz = std::mem::take(&mut self.dz);
+        for i in 0..problem.contacts() {
+            for (c, k) in self.columns_of(i).iter().zip(self.column_offsets[i]..) {
+                for (row, r) in (problem.offsets[i]..problem.offsets[i + 1]).enumerate() {
+                    dz[r] -= c[row] * reduced[k];
+                }
+            }
+        }
+        (self.Wdz, self.dz, self.reduced) = (Wb, dz, reduced);
+        true
+    }
+
+    fn columns_of(&self, contact: usize) -> &[[f64; 3]] {
+        let count = self.column_offsets[contact + 1] - self.column_offsets[contact];
+        &self.columns[contact][..count]
+    }
+
+    /// Factors `I + LᵀWL`, unless it is the matrix that was factored last.
+    fn factor_hessian(&mut self, problem: &ConeProblem, size: usize, work: &mut ConeWork) -> bool {
+        let mut matrix = std::mem::take(&mut self.fresh);
+        matrix.clear();
+        matrix.resize(size * size, 0.0);
+        for j in 0..problem.contacts() {
+            for (c, column) in self.columns_of(j).iter().enumerate() {
+                let at = self.column_offsets[j] + c;
+                for i in j..problem.contacts() {
+                    let columns = self.columns_of(i);
+                    if columns.is_empty() {
+                        continue;
+                    }
+                    let rows = problem.offsets[i]..problem.offsets[i + 1];
+                    let mut Wc = [0.0; 3];
+                    for (k, r) in rows.enumerate() {
+                        let mut sum = 0.0;
+                        for (x, s) in column.iter().zip(problem.offsets[j]..problem.offsets[j + 1]) {
+                            sum += x * problem.W[s * problem.rows() + r];
+                        }
+                        Wc[k] = sum;
+                    }
+                    for (d, other) in columns.iter().enumerate() {
+                        matrix[at * size + self.column_offsets[i] + d] = dot(other, &Wc);
+                    }
+                }
+                matrix[at * size + at] += 1.0;
+            }
+        }
+        if self.hessian.order() == size && self.factored == matrix {
+            self.fresh = matrix;
+            return true;
+        }
+        self.hessian.matrix(size).copy_from_slice(&matrix);
+        work.factorizations += 1;
+        let done = self.hessian.factorize().is_ok();
+        self.fresh = std::mem::replace(&mut self.factored, matrix);
+        if !done {
+            self.factored.clear();
+        }
+        done
+    }
+
+    /// Root of the monotone `f′(t) = (W dz)·(z + t dz − γ(z + t dz))`, to a tenth of f′(0).
+    fn line_search(&self, problem: &ConeProblem, z: &[f64], dz: &[f64], Wdz: &[f64]) -> f64 {
+        let slope = |t: f64| {
+            let mut sum = 0.0;
+            for i in 0..problem.contacts() {
+                let rows = problem.offsets[i]..problem.offsets[i + 1];
+                let mut u = [0.0; 3];
+                for (n, k) in rows.clone().enumerate() {
+                    u[n] = self.u[k] - t * Wdz[k] / self.R[i];
+                }
+                let force = cone::project(u, problem.friction[i]).force;
+                for (n, k) in rows.enumerate() {
+                    sum += Wdz[k] * (z[k] + t * dz[k] - force[n]);
+                }
+            }
+            sum
+        };
+        let at_start = slope(0.0);
+        if !(at_start < 0.0) {
+            return 1.0;
+        }
+        let enough = 0.1 * at_start.abs();
+        let (mut low, mut f_low, mut high) = (0.0, at_start, 1.0);
+        let mut f_high = slope(high);
+        while f_high < -enough && high < 16.0 {
+            (low, f_low) = (high, f_high);
+            high *= 2.0;
+            f_high = slope(high);
+        }
+        if f_high.abs() <= enough || f_high < 0.0 {
+            return high;
+        }
+        for _ in 0..30 {
+            // Secant, kept off the ends of the bracket.
+            let t = low + (high - low) * (f_low / (f_low - f_high)).clamp(0.05, 0.95);
+            let f = slope(t);
+            if f.abs() <= enough {
+                return t;
+            }
+            if f < 0.0 {
+                (low, f_low) = (t, f);
+            } else {
+                (high, f_high) = (t, f);
+            }
+        }
+        low.max(1e-6)
+    }
+}
+
+fn spatial(rows: &[f64]) -> [f64; 3] {
+    match rows {
+        [n, t1, t2] => [*n, *t1, *t2],
+        [n, ..] => [*n, 0.0, 0.0],
+        [] => [0.0; 3],
+    }
+}
+
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Largest absolute value; infinite if one is NaN.
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    let larger = |a: f64, v: f64| if v.is_nan() { f64::INFINITY } else { a.max(v.abs()) };
+    values.fold(0.0, larger)
+}

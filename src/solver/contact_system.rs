@@ -1,0 +1,252 @@
+//! The contacts of an island as a cone problem: `W = J P Jᵀ + h² J M⁻¹ Jᵀ`, gaps, warm starts.
+//!
+//! `W` and the directions stay fixed within a step; gaps are taken anew in every iteration.
+
+use super::body_problem::BodyProblem;
+use super::cone_newton::{ConeProblem, ConeSolver, ConeTolerance, ConeWork};
+use super::factor_cache::SystemFactor;
+use super::partner::{Partner, Reaction};
+use crate::contact::{Row, Side};
+use crate::math::{Mat3, Vec3};
+
+/// Contacts of the bodies of one island.
+#[derive(Default)]
+pub(crate) struct ContactSystem {
+    pub rows: Vec<Row>,
+    problem: ConeProblem,
+    solver: ConeSolver,
+    /// Forces [N], packed as the problem is.
+    pub lambda: Vec<f64>,
+    /// De Saxcé shift of each contact [m].
+    pub shift: Vec<f64>,
+    /// What each gap has to reach at the end of the step [m]: restitution and bounded recovery.
+    goals: Vec<f64>,
+    g_free: Vec<f64>,
+    slips: Vec<f64>,
+}
+
+/// Limits that the user sets per world.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ContactLimits {
+    /// Speed at which overlaps at the start of a step are recovered [m/s].
+    pub recovery_speed: f64,
+    /// Approach below this speed does not bounce [m/s].
+    pub restitution_threshold: f64,
+    /// Relative accuracy of the forces.
+    pub tolerance: f64,
+}
+
+/// Solves with a fresh shift per global iteration.
+const SHIFT_ROUNDS: usize = 2;
+
+impl ContactSystem {
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Packs the rows for a step of `h` [s], with their warm starts.
+    pub fn begin(&mut self, bodies: &[BodyProblem], partners: &[Partner], h: f64, limits: &ContactLimits) {
+        self.problem.offsets.clear();
+        self.problem.offsets.push(0);
+        self.problem.friction.clear();
+        self.lambda.clear();
+        self.shift.clear();
+        self.goals.clear();
+        for row in &self.rows {
+            self.lambda.extend(row.directions().iter().map(|d| d.dot(&row.warm_force)));
+            self.shift.push(row.warm_shift_rate * h);
+            self.problem.offsets.push(self.lambda.len());
+            self.problem.friction.push(row.friction);
+            self.goals.push(goal(row, bodies, partners, h, limits));
+        }
+    }
+
+    /// Assembles W for the current frames and scalings of the bodies.
+    pub fn assemble(&mut self, bodies: &[BodyProblem], factors: &[&SystemFactor], partners: &[Partner], h: f64) {
+        let m = self.problem.rows();
+        let mut W = std::mem::take(&mut self.problem.W);
+        W.clear();
+        W.resize(m * m, 0.0);
+        let offsets = &self.problem.offsets;
+        for (j, b) in self.rows.iter().enumerate() {
+            for (i, a) in self.rows.iter().enumerate().skip(j) {
+                let block = compliance(a, b, bodies, factors, partners, h);
+                let Some(block) = block else { continue };
+                for c in 0..b.dimension() {
+                    for r in 0..a.dimension() {
+                        W[(offsets[j] + c) * m + offsets[i] + r] = block[(r, c)];
+                        W[(offsets[i] + r) * m + offsets[j] + c] = block[(r, c)];
+                    }
+                }
+            }
+        }
+        self.problem.W = W;
+    }
+
+    /// Takes the gaps at the bodies' trial positions, solves for λ, and lays the forces on the nodes
+    /// of the bodies.
+    pub fn solve(&mut self, bodies: &mut [BodyProblem], partners: &[Partner], h: f64, tolerance: ConeTolerance) -> ConeWork {
+        self.g_free.clear();
+        for (row, goal) in self.rows.iter().zip(&self.goals) {
+            let moved = relative_motion(row, bodies, partners, h);
+            self.g_free.push(row.frame[0].dot(&moved) + goal);
+            self.g_free.extend(row.directions()[1..].iter().map(|t| t.dot(&moved)));
+        }
+        let mut work = ConeWork::default();
+        let slides = self.problem.friction.iter().any(|mu| *mu > 0.0);
+        for _ in 0..if slides { SHIFT_ROUNDS } else { 1 } {
+            self.problem.g.clone_from(&self.g_free);
+            for (i, shift) in self.shift.iter().enumerate() {
+                self.problem.g[self.problem.offsets[i]] += shift;
+            }
+            let done = self.solver.solve(&self.problem, &mut self.lambda, tolerance);
+            work.newton_steps += done.newton_steps;
+            work.factorizations += done.factorizations;
+            work.failures += done.failures;
+            self.update_shifts();
+        }
+        self.lay_forces(bodies);
+        work
+    }
+
+    /// σ = μ‖slip‖ of contacts that carry, 0 of open ones.
+    fn update_shifts(&mut self) {
+        self.problem.multiply(&self.lambda, &mut self.slips);
+        for i in 0..self.rows.len() {
+            let first = self.problem.offsets[i];
+            self.shift[i] = 0.0;
+            if self.problem.offsets[i + 1] - first == 3 && self.lambda[first] > 0.0 {
+                let slip = |k: usize| self.g_free[first + k] + self.slips[first + k];
+                self.shift[i] = self.problem.friction[i] * slip(1).hypot(slip(2));
+            }
+        }
+    }
+
+    fn lay_forces(&self, bodies: &mut [BodyProblem]) {
+        for body in bodies.iter_mut() {
+            body.contact_force.fill(Vec3::zeros());
+        }
+        for (i, row) in self.rows.iter().enumerate() {
+            let force = self.force(i);
+            for (side, sign) in row.sides.iter().zip([1.0, -1.0]) {
+                if let Side::Soft { body, .. } = side {
+                    for (node, weight) in side.soft_nodes() {
+                        bodies[*body].contact_force[node] += force * (sign * weight);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Force [N] of contact `i` on its side 0.
+    pub fn force(&self, i: usize) -> Vec3 {
+        self.rows[i].force(&self.lambda[self.problem.offsets[i]..self.problem.offsets[i + 1]])
+    }
+
+    /// Gap [m] of contact `i` at the end of the step.
+    pub fn final_gap(&self, i: usize) -> f64 {
+        let normal = self.problem.offsets[i];
+        self.g_free[normal] + self.slips[normal] - self.goals[i] + self.rows[i].gap
+    }
+
+    /// Adds what the contacts do to the partners over the step.
+    pub fn add_reactions(&self, partners: &[Partner], h: f64, reactions: &mut [Reaction]) {
+        for (i, row) in self.rows.iter().enumerate() {
+            let force = self.force(i);
+            if force == Vec3::zeros() {
+                continue;
+            }
+            for (side, sign) in row.sides.iter().zip([1.0, -1.0]) {
+                if let Side::Partner { partner, point } = side {
+                    let p = partner.0 as usize;
+                    partners[p].add_reaction(&mut reactions[p], point, &(force * sign), h);
+                }
+            }
+        }
+    }
+}
+
+/// What to add to the motion along the normal so that zero is the goal.
+fn goal(
+    row: &Row,
+    bodies: &[BodyProblem],
+    partners: &[Partner],
+    h: f64,
+    limits: &ContactLimits,
+) -> f64 {
+    let velocity = |side: &Side| match side {
+        Side::Soft { body, .. } => side.interpolate(&bodies[*body].v_start),
+        Side::Partner { partner, point } => partners[partner.0 as usize].velocity(point, h),
+    };
+    let approach = -row.frame[0].dot(&(velocity(&row.sides[0]) - velocity(&row.sides[1])));
+    let hits = row.gap < approach * h;
+    let is_new = row.warm_force == Vec3::zeros();
+    if is_new && hits && row.restitution > 0.0 && approach > limits.restitution_threshold {
+        // Leaves with e times the speed it came with, from where it is.
+        return -row.restitution * approach * h;
+    }
+    row.gap.max(-limits.recovery_speed * h)
+}
+
+/// How far side 0 has moved against side 1 since the start of the step, at the trial positions [m].
+fn relative_motion(row: &Row, bodies: &[BodyProblem], partners: &[Partner], h: f64) -> Vec3 {
+    let moved = |side: &Side| match side {
+        Side::Soft { body, .. } => {
+            let b = &bodies[*body];
+            let nodes = side.soft_nodes();
+            nodes.fold(Vec3::zeros(), |sum, (n, w)| sum + (b.trial.x[n] - b.x_start[n]) * w)
+        }
+        Side::Partner { partner, point } => partners[partner.0 as usize].free_displacement(point, h),
+    };
+    moved(&row.sides[0]) - moved(&row.sides[1])
+}
+
+/// The block of W between two contacts; `None` if they have nothing in common.
+fn compliance(
+    a: &Row,
+    b: &Row,
+    bodies: &[BodyProblem],
+    factors: &[&SystemFactor],
+    partners: &[Partner],
+    h: f64,
+) -> Option<Mat3> {
+    let mut sum = None;
+    for (side_a, sign_a) in a.sides.iter().zip([1.0, -1.0]) {
+        for (side_b, sign_b) in b.sides.iter().zip([1.0, -1.0]) {
+            let term = match (side_a, side_b) {
+                (Side::Soft { body: i, .. }, Side::Soft { body: j, .. }) if i == j => {
+                    soft_compliance(side_a, side_b, a, b, &bodies[*i], factors[*i])
+                }
+                (Side::Partner { partner: i, point: p }, Side::Partner { partner: j, point: q })
+                    if i == j && partners[i.0 as usize].yields() =>
+                {
+                    let partner = &partners[i.0 as usize];
+                    Mat3::from_fn(|r, c| partner.compliance(p, &a.frame[r], q, &b.frame[c], h))
+                }
+                _ => continue,
+            };
+            *sum.get_or_insert(Mat3::zeros()) += term * (sign_a * sign_b);
+        }
+    }
+    sum
+}
+
+fn soft_compliance(
+    side_a: &Side,
+    side_b: &Side,
+    a: &Row,
+    b: &Row,
+    body: &BodyProblem,
+    factor: &SystemFactor,
+) -> Mat3 {
+    let index = &body.model.surface.index_of_node;
+    let mut block = Mat3::zeros();
+    for (i, wa) in side_a.soft_nodes() {
+        for (j, wb) in side_b.soft_nodes() {
+            let inverse = factor.columns.block(index[i] as usize, index[j] as usize);
+            block += body.metric.compliance(&inverse, i, j) * (wa * wb / body.scaling);
+        }
+    }
+    let (A, B) = (Mat3::from_columns(&a.frame), Mat3::from_columns(&b.frame));
+    A.tr_mul(&(block * B))
+}

@@ -1,0 +1,227 @@
+//! Sparse and dense Cholesky factors: the one file that names faer.
+//!
+//! All solves are sequential (`Par::Seq`): faer's threads cost more than small supernodes are
+//! worth, and parallelism is over bodies. Everything works in memory the caller owns.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
+    factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
+use faer::{Conj, MatMut, MatRef, Par, Side, Spec};
+
+/// Right-hand sides of one batch of columns: always the same number, so that a column has the same
+/// bits whichever batch it comes from.
+pub(crate) const BATCH: usize = 24;
+
+/// Sparsity of a symmetric matrix (upper triangle by columns) and of its factor.
+#[derive(Debug)]
+pub(crate) struct Symbolic {
+    pattern: SymbolicSparseColMat<usize>,
+    cholesky: SymbolicCholesky<usize>,
+}
+
+/// A numeric factor `A = L Lᵀ`.
+#[derive(Debug)]
+pub(crate) struct Factor {
+    values: Vec<f64>,
+}
+
+/// Memory for solves and factorizations; grows to what is needed and stays.
+#[derive(Default)]
+pub(crate) struct FactorScratch {
+    buffer: Option<MemBuffer>,
+    bytes: usize,
+}
+
+/// The matrix is not positive definite, or not finite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct NotPositiveDefinite;
+
+impl Symbolic {
+    /// `column_starts` (n + 1) and ascending `rows` of the upper triangle, diagonal included. The
+    /// order of the unknowns is kept: nodes are numbered by nested dissection already. (With the
+    /// identity for its order faer 0.24 takes the upper triangle, whatever the side it is told.)
+    pub fn new(n: usize, column_starts: Vec<usize>, rows: Vec<usize>) -> Option<Self> {
+        let pattern = SymbolicSparseColMat::new_checked(n, n, column_starts, None, rows);
+        let cholesky = factorize_symbolic_cholesky(
+            pattern.as_ref(),
+            Side::Upper,
+            SymmetricOrdering::Identity,
+            CholeskySymbolicParams::default(),
+        );
+        Some(Self {
+            pattern,
+            cholesky: cholesky.ok()?,
+        })
+    }
+
+    pub fn column_starts(&self) -> &[usize] {
+        self.pattern.col_ptr()
+    }
+
+    pub fn rows(&self) -> &[usize] {
+        self.pattern.row_idx()
+    }
+
+    /// Bytes of the numeric factor.
+    pub fn factor_bytes(&self) -> usize {
+        self.cholesky.len_val() * size_of::<f64>()
+    }
+
+    /// Factors the matrix with these `values`, in the order of [`Symbolic::rows`].
+    pub fn factorize(
+        &self,
+        values: &[f64],
+        scratch: &mut FactorScratch,
+    ) -> Result<Factor, NotPositiveDefinite> {
+        let A = SparseColMatRef::new(self.pattern.as_ref(), values);
+        let need = self
+            .cholesky
+            .factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
+        let mut factor = vec![0.0; self.cholesky.len_val()];
+        self.cholesky
+            .factorize_numeric_llt(
+                &mut factor,
+                A,
+                Side::Upper,
+                Default::default(),
+                Par::Seq,
+                scratch.stack(need.unaligned_bytes_required()),
+                Spec::default(),
+            )
+            .map_err(|_| NotPositiveDefinite)?;
+        Ok(Factor { values: factor })
+    }
+
+    /// Solves `A X = B` in place; `rhs` holds the columns of B one after the other.
+    pub fn solve(&self, factor: &Factor, rhs: &mut [f64], columns: usize, scratch: &mut FactorScratch) {
+        let n = self.cholesky.nrows();
+        let need = self.cholesky.solve_in_place_scratch::<f64>(columns, Par::Seq);
+        LltRef::new(&self.cholesky, &factor.values).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(rhs, n, columns),
+            Par::Seq,
+            scratch.stack(need.unaligned_bytes_required()),
+        );
+    }
+}
+
+impl FactorScratch {
+    fn stack(&mut self, bytes: usize) -> &mut MemStack {
+        if self.bytes < bytes {
+            self.buffer = None;
+            self.bytes = bytes;
+        }
+        let bytes = self.bytes;
+        let new = || MemBuffer::new(faer::dyn_stack::StackReq::new::<u8>(bytes));
+        MemStack::new(self.buffer.get_or_insert_with(new))
+    }
+}
+
+/// Dense Cholesky factor of a symmetric positive definite matrix.
+#[derive(Default)]
+pub(crate) struct DenseFactor {
+    n: usize,
+    values: Vec<f64>,
+    scratch: FactorScratch,
+}
+
+impl DenseFactor {
+    /// Order of the factored matrix.
+    pub fn order(&self) -> usize {
+        self.n
+    }
+
+    /// The memory for a matrix of order n, column by column; only its lower triangle is read.
+    pub fn matrix(&mut self, n: usize) -> &mut [f64] {
+        self.n = n;
+        self.values.clear();
+        self.values.resize(n * n, 0.0);
+        &mut self.values
+    }
+
+    /// Factors what was written to [`DenseFactor::matrix`].
+    pub fn factorize(&mut self) -> Result<(), NotPositiveDefinite> {
+        let n = self.n;
+        let need = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Spec::default());
+        llt::factor::cholesky_in_place(
+            MatMut::from_column_major_slice_mut(&mut self.values, n, n),
+            Default::default(),
+            Par::Seq,
+            self.scratch.stack(need.unaligned_bytes_required()),
+            Spec::default(),
+        )
+        .map(|_| ())
+        .map_err(|_| NotPositiveDefinite)
+    }
+
+    /// Solves in place.
+    pub fn solve(&mut self, rhs: &mut [f64]) {
+        let n = self.n;
+        llt::solve::solve_in_place(
+            MatRef::from_column_major_slice(&self.values, n, n),
+            MatMut::from_column_major_slice_mut(rhs, n, 1),
+            Par::Seq,
+            self.scratch.stack(0),
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn factors_solve_what_they_were_made_of(
+            n in 1usize..40, seed in proptest::collection::vec(-1.0..1.0f64, 200), columns in 1usize..4,
+        ) {
+            // Diagonally dominant with a few entries off the diagonal.
+            let entry = |i: usize, j: usize| match (i - j) * 7 % 5 {
+                0 | 2 => seed[(i * 13 + j * 31) % seed.len()],
+                _ => 0.0,
+            };
+            let at = |i: usize, j: usize| if i == j { 40.0 } else { entry(i.max(j), i.min(j)) };
+            let (mut starts, mut rows, mut values) = (vec![0], vec![], vec![]);
+            for j in 0..n {
+                for i in 0..=j {
+                    if i == j || entry(j, i) != 0.0 {
+                        rows.push(i);
+                        values.push(at(i, j));
+                    }
+                }
+                starts.push(rows.len());
+            }
+            let x: Vec<f64> = (0..n * columns).map(|k| seed[(k * 3) % seed.len()]).collect();
+            let b: Vec<f64> = (0..n * columns)
+                .map(|k| (0..n).map(|j| at(k % n, j) * x[k / n * n + j]).sum())
+                .collect();
+            let mut scratch = FactorScratch::default();
+            let symbolic = Symbolic::new(n, starts, rows).unwrap();
+            let factor = symbolic.factorize(&values, &mut scratch).unwrap();
+            let mut sparse = b.clone();
+            symbolic.solve(&factor, &mut sparse, columns, &mut scratch);
+            let mut dense = DenseFactor::default();
+            let matrix = dense.matrix(n);
+            for k in 0..n * n { matrix[k] = at(k % n, k / n); }
+            dense.factorize().unwrap();
+            let mut column = b[..n].to_vec();
+            dense.solve(&mut column);
+            for k in 0..n * columns { prop_assert!((sparse[k] - x[k]).abs() < 1e-13); }
+            for k in 0..n { prop_assert!((column[k] - x[k]).abs() < 1e-13); }
+        }
+    }
+
+    #[test]
+    fn indefinite_and_non_finite_matrices_are_refused() {
+        let mut dense = DenseFactor::default();
+        for bad in [-1.0, f64::NAN] {
+            dense.matrix(2).copy_from_slice(&[1.0, 0.0, 0.0, bad]);
+            assert_eq!(dense.factorize(), Err(NotPositiveDefinite));
+        }
+    }
+}

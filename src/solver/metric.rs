@@ -1,0 +1,210 @@
+//! The metric of the global step: `P = Q A⁻¹ Qᵀ` with rotating frames Q around the constant factor.
+//!
+//! One frame per node does not know that the body as a whole may be pushed without strain. That
+//! mode is put back exactly: with masses m_i (total m), 1 the rigid translation,
+//! `P = (I − 1mᵀ/m) P₀ (I − m1ᵀ/m) + h²/(1 + αh)/m · 11ᵀ`.
+//!
+//! Frames are rounded to about 10⁻⁴ rad. That costs no convergence to speak of, and at rest they
+//! are the same bits in every step, so whatever was made from them can be used again.
+
+use super::factor::FactorScratch;
+use super::factor_cache::SystemFactor;
+use super::system::FactorKey;
+use crate::body::elastic::element_rotations;
+use crate::body::{DeformableModel, SystemMatrix};
+use crate::math::lanes::LANES;
+use crate::math::polar::polar_rotation;
+use crate::math::{Mat3, Vec3};
+
+/// Frames of one body and what follows from them.
+#[derive(Default)]
+pub(crate) struct Metric {
+    kind: FrameKind,
+    floating: Mat3,
+    per_node: Vec<Mat3>,
+    deflation: Deflation,
+    rhs: Vec<f64>,
+    scratch: FactorScratch,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum FrameKind {
+    /// The Laplacian: the same in all directions.
+    #[default]
+    Isotropic,
+    Floating,
+    PerNode,
+}
+
+/// The translation mode of per-node frames.
+#[derive(Default)]
+struct Deflation {
+    active: bool,
+    /// `G_i = Σ_k P₀_ik m_k`.
+    coupling: Vec<Mat3>,
+    /// `Σ_i m_i G_i`.
+    mean: Mat3,
+    /// What they were made from.
+    made_from: Option<(FactorKey, Vec<Mat3>)>,
+    masses: Vec<f64>,
+    total_mass: f64,
+    /// h²/(1 + αh) [s²].
+    mobility: f64,
+}
+
+impl Metric {
+    /// The scalar matrix: no frames.
+    pub fn set_isotropic(&mut self) {
+        self.kind = FrameKind::Isotropic;
+        self.deflation.active = false;
+    }
+
+    /// One frame for the body.
+    pub fn set_floating(&mut self, rotation: &Mat3) {
+        self.kind = FrameKind::Floating;
+        self.floating = rounded(rotation);
+        self.deflation.active = false;
+    }
+
+    /// One frame per node, of the elements at `x`; `free` bodies (without pins) get their
+    /// translation mode back.
+    pub fn set_per_node(
+        &mut self,
+        model: &DeformableModel,
+        x: &[Vec3],
+        masses: &[f64],
+        mobility: f64,
+        key: &FactorKey,
+        factor: &SystemFactor,
+    ) {
+        self.kind = FrameKind::PerNode;
+        self.per_node.clear();
+        self.per_node.resize(x.len(), Mat3::zeros());
+        for (block, rotations) in element_rotations(model, x) {
+            for i in 0..LANES {
+                let weighted = rotations.lane(i) * block.volumes.0[i];
+                for a in 0..4 {
+                    self.per_node[block.corners[a][i] as usize] += weighted;
+                }
+            }
+        }
+        self.per_node.iter_mut().for_each(|q| *q = rounded(&polar_rotation(q)));
+        self.deflation.active = key.pins.is_empty();
+        if self.deflation.active {
+            self.refresh_deflation(masses, mobility, key, factor);
+        }
+    }
+
+    fn refresh_deflation(&mut self, masses: &[f64], mobility: f64, key: &FactorKey, factor: &SystemFactor) {
+        let same = |(k, frames): &(FactorKey, Vec<Mat3>)| k == key && *frames == self.per_node;
+        if self.deflation.made_from.as_ref().is_some_and(same) {
+            return;
+        }
+        let mut coupling = std::mem::take(&mut self.deflation.coupling);
+        coupling.clear();
+        coupling.resize(masses.len(), Mat3::zeros());
+        let mut column = vec![Vec3::zeros(); masses.len()];
+        for c in 0..3 {
+            let push: Vec<Vec3> = masses.iter().map(|m| Vec3::ith(c, *m)).collect();
+            self.rotate_and_solve(factor, &push, &mut column);
+            for (g, v) in coupling.iter_mut().zip(&column) {
+                g.set_column(c, v);
+            }
+        }
+        let mean = coupling.iter().zip(masses).fold(Mat3::zeros(), |sum, (g, m)| sum + g * *m);
+        self.deflation = Deflation {
+            active: true,
+            coupling,
+            mean: (mean + mean.transpose()) * 0.5,
+            made_from: Some((key.clone(), self.per_node.clone())),
+            masses: masses.to_vec(),
+            total_mass: masses.iter().sum(),
+            mobility,
+        };
+    }
+
+    /// `out = P r`: displacements [m] of forces [N].
+    pub fn apply(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
+        if !self.deflation.active {
+            self.rotate_and_solve(factor, r, out);
+            return;
+        }
+        let sum: Vec3 = r.iter().sum();
+        let d = std::mem::take(&mut self.deflation);
+        let acceleration = sum / d.total_mass;
+        let balanced: Vec<Vec3> = r.iter().zip(&d.masses).map(|(r, m)| r - acceleration * *m).collect();
+        self.rotate_and_solve(factor, &balanced, out);
+        let drift = out.iter().zip(&d.masses).fold(Vec3::zeros(), |a, (o, m)| a + o * *m) / d.total_mass;
+        let shift = acceleration * d.mobility - drift;
+        out.iter_mut().for_each(|o| *o += shift);
+        self.deflation = d;
+    }
+
+    /// `out = Q A⁻¹ Qᵀ r`.
+    fn rotate_and_solve(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
+        let n = r.len();
+        self.rhs.resize(3 * n, 0.0);
+        match factor.system {
+            SystemMatrix::Laplacian => {
+                for i in 0..n {
+                    for c in 0..3 {
+                        self.rhs[n * c + i] = r[i][c];
+                    }
+                }
+                factor.symbolic.solve(&factor.factor, &mut self.rhs, 3, &mut self.scratch);
+                for i in 0..n {
+                    out[i] = Vec3::new(self.rhs[i], self.rhs[n + i], self.rhs[2 * n + i]);
+                }
+            }
+            SystemMatrix::RestStiffness => {
+                for i in 0..n {
+                    let turned = self.frame(i).tr_mul(&r[i]);
+                    self.rhs[3 * i..3 * i + 3].copy_from_slice(turned.as_slice());
+                }
+                factor.symbolic.solve(&factor.factor, &mut self.rhs, 1, &mut self.scratch);
+                for i in 0..n {
+                    out[i] = self.frame(i) * Vec3::from_column_slice(&self.rhs[3 * i..3 * i + 3]);
+                }
+            }
+        }
+    }
+
+    /// The frame of a node.
+    fn frame(&self, node: usize) -> Mat3 {
+        match self.kind {
+            FrameKind::Isotropic => Mat3::identity(),
+            FrameKind::Floating => self.floating,
+            FrameKind::PerNode => self.per_node[node],
+        }
+    }
+
+    /// The block of P between two surface nodes, given the one of `A⁻¹` [m/N].
+    pub fn compliance(&self, inverse_block: &Mat3, i: usize, j: usize) -> Mat3 {
+        let block = match self.kind {
+            FrameKind::Isotropic => *inverse_block,
+            _ => self.frame(i) * inverse_block * self.frame(j).transpose(),
+        };
+        let d = &self.deflation;
+        if !d.active {
+            return block;
+        }
+        let rigid = d.mean / (d.total_mass * d.total_mass)
+            + Mat3::from_diagonal_element(d.mobility / d.total_mass);
+        block - (d.coupling[i] + d.coupling[j].transpose()) / d.total_mass + rigid
+    }
+
+    /// Bits of the frames that a node's compliance depends on.
+    pub fn is_per_node(&self) -> bool {
+        self.kind == FrameKind::PerNode
+    }
+}
+
+/// A rotation rounded to quaternion components of 2⁻¹³.
+fn rounded(rotation: &Mat3) -> Mat3 {
+    let R = nalgebra::Rotation3::from_matrix_unchecked(*rotation);
+    let q = nalgebra::UnitQuaternion::from_rotation_matrix(&R);
+    let coarse = q.coords.map(|c| (c * 8192.0).round() / 8192.0);
+    nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::from_vector(coarse))
+        .to_rotation_matrix()
+        .into_inner()
+}

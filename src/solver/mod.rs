@@ -1,0 +1,23 @@
+//! One step of the bodies: prediction, the constant matrix and its factor, the global iteration, and
+//! the contact problem in it.
+//!
+//! Architecture invariant: nothing here knows rapier; only `factor.rs` names faer.
+
+mod body_problem;
+mod columns;
+mod cone_newton;
+mod contact_system;
+mod factor;
+mod factor_cache;
+mod island;
+mod lbfgs;
+mod metric;
+mod partner;
+mod system;
+
+pub(crate) use body_problem::BodyProblem;
+pub(crate) use contact_system::ContactLimits;
+pub(crate) use factor_cache::FactorCache;
+pub(crate) use island::Island;
+pub(crate) use partner::{Partner, Reaction};
+pub(crate) use system::FactorKey;

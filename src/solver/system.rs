@@ -1,0 +1,135 @@
+//! The constant matrix of the global step, assembled.
+//!
+//! Rest stiffness: `A = (1 + αh) M/h² + (1 + β/h) K₀`, `K₀_ab = Σ_e V[μ((g_a·g_b)I + g_b g_aᵀ) + λ g_a g_bᵀ]`.
+//! Laplacian: `A = (1 + αh) M/h² + (1 + β/h) Σ_e w V GᵀG` [Bouaziz et al. 2014].
+//! A pinned node has the identity for its row and column, so every set of pins shares one symbolic
+//! factor.
+
+use super::factor::Symbolic;
+use crate::body::{DeformableBody, DeformableModel, SystemMatrix};
+use crate::energy::{ElementEnergy, with_energy};
+use crate::material::DeformableMaterial;
+use crate::math::{Mat3, Vec3};
+
+/// Everything a numeric factor depends on: it is valid for any body that agrees in all of it.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct FactorKey {
+    pub model: u64,
+    pub system: SystemMatrix,
+    elasticity: crate::energy::Elasticity,
+    /// Bits of h, E, ν, ρ, α, β.
+    bits: [u64; 6],
+    /// Pinned nodes, ascending.
+    pub pins: Vec<u32>,
+}
+
+impl FactorKey {
+    pub fn new(body: &DeformableBody, h: f64) -> Self {
+        let m = &body.material;
+        let [e, nu, rho] = [m.youngs_modulus, m.poisson_ratio, m.density];
+        Self {
+            model: body.model.id,
+            system: body.settings().system,
+            elasticity: m.elasticity,
+            bits: [h, e, nu, rho, m.mass_damping, m.stiffness_damping].map(f64::to_bits),
+            pins: body.pins.iter().map(|p| p.node).collect(),
+        }
+    }
+}
+
+/// Unknowns per node.
+pub(crate) fn dimension(system: SystemMatrix) -> usize {
+    match system {
+        SystemMatrix::RestStiffness => 3,
+        SystemMatrix::Laplacian => 1,
+    }
+}
+
+/// The sparsity of a body's matrix.
+pub(crate) fn symbolic(model: &DeformableModel, system: SystemMatrix) -> Option<Symbolic> {
+    let d = dimension(system);
+    let n = model.rest.len();
+    let (mut starts, mut rows) = (vec![0], Vec::new());
+    for i in 0..n {
+        let above = model.adjacency[i].iter().map(|&j| j as usize).filter(|&j| j < i);
+        let above: Vec<usize> = above.collect();
+        for r in 0..d {
+            rows.extend(above.iter().flat_map(|&j| (0..d).map(move |c| d * j + c)));
+            rows.extend((0..=r).map(|c| d * i + c));
+            starts.push(rows.len());
+        }
+    }
+    Symbolic::new(d * n, starts, rows)
+}
+
+/// The values of a body's matrix, in the order of [`Symbolic::rows`].
+pub(crate) fn assemble(
+    model: &DeformableModel,
+    material: &DeformableMaterial,
+    pins: &[u32],
+    system: SystemMatrix,
+    h: f64,
+    symbolic: &Symbolic,
+) -> Vec<f64> {
+    let d = dimension(system);
+    let mut values = vec![0.0; symbolic.rows().len()];
+    let mut matrix = Upper { symbolic, values: &mut values, d };
+    let mut pinned = vec![false; model.rest.len()];
+    pins.iter().for_each(|&p| pinned[p as usize] = true);
+    let inertia = material.density * (1.0 + material.mass_damping * h) / (h * h);
+    for (j, &volume) in model.node_volumes.iter().enumerate() {
+        let diagonal = if pinned[j] { 1.0 } else { inertia * volume };
+        matrix.add(j, j, &Mat3::from_diagonal_element(diagonal));
+    }
+    let stiffening = 1.0 + material.stiffness_damping / h;
+    let lame = material.lame();
+    let weight = with_energy!(material, energy => energy.laplacian_weight());
+    for (e, tet) in model.tetrahedra.iter().enumerate() {
+        let block = &model.blocks[e / crate::math::lanes::LANES];
+        let lane = e % crate::math::lanes::LANES;
+        let g: [Vec3; 4] = block.shape_gradients(lane);
+        let volume = block.volumes.0[lane] * stiffening;
+        for a in 0..4 {
+            for b in 0..4 {
+                let (i, j) = (tet[a] as usize, tet[b] as usize);
+                if i < j || pinned[i] || pinned[j] {
+                    continue;
+                }
+                let stiffness = match system {
+                    SystemMatrix::Laplacian => Mat3::from_diagonal_element(weight * g[a].dot(&g[b])),
+                    SystemMatrix::RestStiffness => {
+                        (Mat3::from_diagonal_element(g[a].dot(&g[b])) + g[b] * g[a].transpose()) * lame.mu
+                            + g[a] * g[b].transpose() * lame.lambda
+                    }
+                };
+                matrix.add(i, j, &(stiffness * volume));
+            }
+        }
+    }
+    values
+}
+
+/// The upper triangle being filled, block by block.
+struct Upper<'a> {
+    symbolic: &'a Symbolic,
+    values: &'a mut [f64],
+    d: usize,
+}
+
+impl Upper<'_> {
+    /// Adds the block between row node i and column node j ≤ i of the symmetric matrix, where it
+    /// stands above the diagonal: transposed.
+    fn add(&mut self, i: usize, j: usize, block: &Mat3) {
+        let d = self.d;
+        let starts = self.symbolic.column_starts();
+        for r in 0..d {
+            let column = starts[d * i + r]..starts[d * i + r + 1];
+            let rows = &self.symbolic.rows()[column.clone()];
+            let Ok(place) = rows.binary_search(&(d * j)) else { continue };
+            let count = if i == j { r + 1 } else { d };
+            for c in 0..count {
+                self.values[column.start + place + c] += block[(r, c)];
+            }
+        }
+    }
+}
