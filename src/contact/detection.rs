@@ -1,6 +1,7 @@
 //! Contacts of one body with one obstacle.
 
 use super::obstacle::Obstacle;
+use super::rim_rows::{corner_on_triangle, corners_in, rim_crossing};
 use super::row::{Row, Side};
 use super::surface_point::{Scales, SurfacePoint, surface_point};
 use super::triangle_rows::triangle_point;
@@ -13,8 +14,6 @@ use parry3d::bounding_volume::{Aabb, BoundingVolume};
 pub(crate) struct Pair {
     /// Index of the body in the step's list.
     pub body: usize,
-    /// Index of the obstacle in the step's list.
-    pub obstacle: usize,
     pub friction: f64,
     pub restitution: f64,
 }
@@ -29,10 +28,28 @@ const BAND: f64 = 1.0e-4;
 /// Finds contacts; holds the memory it needs between calls.
 #[derive(Default)]
 pub(crate) struct Detector {
+    /// Per surface node, in the world: normal, and how far the node may come.
     normals: Vec<Vec3>,
-    local: Vec<Vec3>,
     reach: Vec<f64>,
-    found: Vec<Option<SurfacePoint>>,
+    /// Per surface node, in the obstacle's frame.
+    local: Vec<Vec3>,
+    nodes: Vec<Option<SurfacePoint>>,
+    /// Rim crossings found per edge.
+    edges: Vec<Option<SurfacePoint>>,
+    /// Corners of the obstacle, and which triangle each stands on.
+    corners: Vec<(u32, Vec3)>,
+    standing: Vec<(usize, SurfacePoint)>,
+}
+
+/// One call's arguments, shared by its parts.
+struct Scene<'a> {
+    pair: &'a Pair,
+    obstacle: &'a Obstacle,
+    model: &'a DeformableModel,
+    extent: Aabb,
+    scales: Scales,
+    /// Largest motion of the obstacle near the body [m].
+    motion: f64,
 }
 
 impl Detector {
@@ -73,71 +90,185 @@ impl Detector {
     ) {
         let first = rows.len();
         let surface = &model.surface;
-        let scales = Scales {
-            band: BAND * model.size,
-            shift: SHIFT * surface.mean_edge,
-        };
         let to_local = |n: &u32| obstacle.start.inverse_transform(&x[*n as usize]);
         self.local.clear();
         self.local.extend(surface.nodes.iter().map(to_local));
-        let extent = obstacle.shape.compute_local_aabb();
-        self.found.clear();
-        self.found.resize(surface.nodes.len(), None);
-        for s in 0..surface.nodes.len() {
-            let p = self.local[s];
-            let world = x[surface.nodes[s] as usize];
-            let reach = self.reach[s] + obstacle.displacement(&world).norm();
-            if !near(&extent, &p, reach) {
-                continue;
-            }
-            let outward = obstacle.start.rotation.tr_mul(&self.normals[s]);
-            self.found[s] = surface_point(obstacle, &p, &outward, &scales);
-            if let Some(found) = self.found[s].filter(|f| f.gap < reach) {
-                let nodes = [surface.nodes[s], 0, 0];
-                let feature = surface.nodes[s];
-                rows.push(row(pair, obstacle, nodes, [1.0, 0.0, 0.0], &found, feature));
-            }
-        }
+        let moves = obstacle.start != obstacle.end;
+        let motion = |n: &u32| obstacle.displacement(&x[*n as usize]).norm();
+        let scene = Scene {
+            pair,
+            obstacle,
+            model,
+            extent: obstacle.shape.compute_local_aabb(),
+            scales: Scales {
+                band: BAND * model.size,
+                shift: SHIFT * surface.mean_edge,
+            },
+            motion: if moves { surface.nodes.iter().map(motion).fold(0.0, f64::max) } else { 0.0 },
+        };
+        self.detect_nodes(&scene, rows);
         if !obstacle.is_half_space() {
-            self.detect_triangles(pair, obstacle, model, x, &extent, &scales, rows);
+            self.detect_rims(&scene, rows);
+            self.detect_corners(&scene, rows);
+            self.detect_triangles(&scene, rows);
         }
         rows[first..].sort_by_key(|r| r.key);
         remove_repeated(rows, first);
     }
 
-    fn detect_triangles(
-        &self,
-        pair: &Pair,
-        obstacle: &Obstacle,
-        model: &DeformableModel,
-        x: &[Vec3],
-        extent: &Aabb,
-        scales: &Scales,
-        rows: &mut Vec<Row>,
-    ) {
-        let surface = &model.surface;
-        let node_count = model.rest.len() as u32;
-        let edge_count = surface.edges.len() as u32;
+    fn detect_nodes(&mut self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
+        let nodes = &scene.model.surface.nodes;
+        self.nodes.clear();
+        self.nodes.resize(nodes.len(), None);
+        for s in 0..nodes.len() {
+            let p = self.local[s];
+            let reach = self.reach[s] + scene.motion;
+            if !near(&scene.extent, &p, reach) {
+                continue;
+            }
+            let outward = scene.obstacle.start.rotation.tr_mul(&self.normals[s]);
+            self.nodes[s] = surface_point(scene.obstacle, &p, &outward, &scene.scales);
+            if let Some(found) = self.nodes[s].filter(|f| f.gap < reach) {
+                rows.push(scene.row([nodes[s], 0, 0], [1.0, 0.0, 0.0], &found, nodes[s]));
+            }
+        }
+    }
+
+    fn detect_rims(&mut self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
+        let surface = &scene.model.surface;
+        self.edges.clear();
+        self.edges.resize(surface.edges.len(), None);
+        for (e, edge) in surface.edges.iter().enumerate() {
+            let ends = edge.map(|n| surface.index_of_node[n as usize] as usize);
+            let reach = self.reach[ends[0]].max(self.reach[ends[1]]) + scene.motion;
+            for [inner, outer] in [[0, 1], [1, 0]] {
+                let (Some(on_face), other) = (self.nodes[ends[inner]], self.nodes[ends[outer]]) else {
+                    continue;
+                };
+                let same_face = |o: SurfacePoint| o.flat && o.normal == on_face.normal;
+                if !on_face.flat || on_face.gap > reach || other.is_some_and(same_face) {
+                    continue;
+                }
+                let [a, b] = [self.local[ends[inner]], self.local[ends[outer]]];
+                let outward = self.edge_normal(surface, e);
+                let crossing = rim_crossing(scene.obstacle, &on_face, &a, &b, &outward, &scene.scales);
+                if let Some((t, found)) = crossing.filter(|(_, f)| f.gap < reach) {
+                    self.edges[e] = Some(found);
+                    let nodes = [edge[inner], edge[outer], 0];
+                    rows.push(scene.row(nodes, [1.0 - t, t, 0.0], &found, scene.edge_feature(e)));
+                }
+            }
+        }
+    }
+
+    fn detect_corners(&mut self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
+        let surface = &scene.model.surface;
+        let reach = self.reach.iter().fold(0.0, |a: f64, b| a.max(*b)) + scene.motion;
+        let body = Aabb::from_points(self.local.iter().map(to_real)).loosened(reach as f32);
+        corners_in(scene.obstacle, &body, &mut self.corners);
+        self.standing.clear();
+        for (number, corner) in &self.corners {
+            let at = to_real(corner);
+            let mut best: Option<(usize, [f64; 3], SurfacePoint)> = None;
+            for (t, triangle) in surface.triangles.iter().enumerate() {
+                let corners = triangle.map(|n| self.local[surface.index_of_node[n as usize] as usize]);
+                let around = Aabb::from_points(corners.iter().map(to_real)).loosened(reach as f32);
+                if !around.contains_local_point(at) {
+                    continue;
+                }
+                let found = corner_on_triangle(corner, &corners, reach, &scene.scales);
+                let Some((weights, row)) = found else { continue };
+                if best.is_none_or(|(_, _, b)| row.gap.abs() < b.gap.abs()) {
+                    best = Some((t, weights, row));
+                }
+            }
+            if let Some((t, weights, found)) = best {
+                self.standing.push((t, found));
+                let feature = scene.corner_feature(*number);
+                rows.push(scene.row(surface.triangles[t], weights, &found, feature));
+            }
+        }
+    }
+
+    fn detect_triangles(&self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
+        let surface = &scene.model.surface;
         for (t, triangle) in surface.triangles.iter().enumerate() {
             let s = triangle.map(|n| surface.index_of_node[n as usize] as usize);
             let corners = s.map(|s| self.local[s]);
-            let motion = obstacle.displacement(&x[triangle[0] as usize]).norm();
-            let reach = s.iter().fold(0.0, |a: f64, &s| a.max(self.reach[s])) + motion;
+            let reach = s.iter().fold(0.0, |a: f64, &s| a.max(self.reach[s])) + scene.motion;
             let around = Aabb::from_points(corners.iter().map(to_real)).loosened(reach as f32);
-            if !around.intersects(extent) {
+            if !around.intersects(&scene.extent) || self.lies_under_one_face(&s) {
                 continue;
             }
-            let corner_rows = s.map(|s| self.found[s]);
-            if let Some(hit) = triangle_point(obstacle, &corners, &corner_rows, reach, scales) {
-                let inside = hit.weights.iter().position(|w| *w == 0.0);
-                let feature = node_count
-                    + match inside {
-                        Some(opposite) => surface.triangle_edges[t][opposite],
-                        None => edge_count + t as u32,
-                    };
-                rows.push(row(pair, obstacle, *triangle, hit.weights, &hit.surface, feature));
+            let edges = surface.triangle_edges[t].map(|e| &self.edges[e as usize]);
+            let standing = self.standing.iter().filter(|(on, _)| *on == t).map(|(_, row)| row);
+            let known = s.iter().filter_map(|&s| self.nodes[s].as_ref());
+            let known = known.chain(edges.into_iter().flatten()).chain(standing);
+            if let Some(hit) = triangle_point(scene.obstacle, &corners, known, reach, &scene.scales) {
+                let feature = match hit.weights.iter().position(|w| *w == 0.0) {
+                    Some(opposite) => scene.edge_feature(surface.triangle_edges[t][opposite] as usize),
+                    None => scene.triangle_feature(t),
+                };
+                rows.push(scene.row(*triangle, hit.weights, &hit.surface, feature));
             }
         }
+    }
+
+    /// Whether a triangle's corners all touch the same plane face: there is nothing to add then.
+    fn lies_under_one_face(&self, s: &[usize; 3]) -> bool {
+        let [Some(a), Some(b), Some(c)] = s.map(|s| self.nodes[s]) else {
+            return false;
+        };
+        let same = |o: &SurfacePoint| o.flat && o.normal == a.normal;
+        a.flat && same(&b) && same(&c)
+    }
+
+    /// The body's normal at an edge, in the obstacle's frame.
+    fn edge_normal(&self, surface: &crate::mesh::Surface, edge: usize) -> Vec3 {
+        let normal = |&t: &u32| {
+            let triangle = surface.triangles[t as usize];
+            let [a, b, c] = triangle.map(|n| self.local[surface.index_of_node[n as usize] as usize]);
+            (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default()
+        };
+        let sum: Vec3 = surface.edge_triangles[edge].iter().map(normal).sum();
+        sum.try_normalize(0.0).unwrap_or_default()
+    }
+}
+
+impl Scene<'_> {
+    fn edge_feature(&self, edge: usize) -> u32 {
+        (self.model.rest.len() + edge) as u32
+    }
+
+    fn triangle_feature(&self, triangle: usize) -> u32 {
+        self.edge_feature(self.model.surface.edges.len() + triangle)
+    }
+
+    fn corner_feature(&self, corner: u32) -> u32 {
+        self.triangle_feature(self.model.surface.triangles.len()) + corner
+    }
+
+    fn row(&self, nodes: [u32; 3], weights: [f64; 3], found: &SurfacePoint, feature: u32) -> Row {
+        let obstacle = self.obstacle;
+        let soft = Side::Soft {
+            body: self.pair.body,
+            nodes,
+            weights,
+        };
+        let partner = Side::Partner {
+            partner: obstacle.partner,
+            point: obstacle.start.transform(&found.point),
+        };
+        let key = ContactKey {
+            obstacle: obstacle.key,
+            part: obstacle.part,
+            feature,
+        };
+        let normal = obstacle.start.rotation * found.normal;
+        let mut row = Row::new([soft, partner], normal.normalize(), found.gap, key);
+        row.friction = self.pair.friction;
+        row.restitution = self.pair.restitution;
+        row
     }
 }
 
@@ -145,35 +276,6 @@ impl Detector {
 fn near(extent: &Aabb, p: &Vec3, reach: f64) -> bool {
     let (low, high) = (from_real(extent.mins), from_real(extent.maxs));
     (0..3).all(|k| p[k] >= low[k] - reach && p[k] <= high[k] + reach)
-}
-
-fn row(
-    pair: &Pair,
-    obstacle: &Obstacle,
-    nodes: [u32; 3],
-    weights: [f64; 3],
-    found: &SurfacePoint,
-    feature: u32,
-) -> Row {
-    let soft = Side::Soft {
-        body: pair.body,
-        nodes,
-        weights,
-    };
-    let partner = Side::Partner {
-        partner: obstacle.partner,
-        point: obstacle.start.transform(&found.point),
-    };
-    let key = ContactKey {
-        obstacle: obstacle.key,
-        part: obstacle.part,
-        feature,
-    };
-    let normal = obstacle.start.rotation * found.normal;
-    let mut row = Row::new([soft, partner], normal.normalize(), found.gap, key);
-    row.friction = pair.friction;
-    row.restitution = pair.restitution;
-    row
 }
 
 /// Of rows with equal keys (an edge seen from both of its triangles) the deepest stays.

@@ -7,6 +7,7 @@ mod candidates;
 pub(crate) mod cone;
 mod detection;
 mod obstacle;
+mod rim_rows;
 mod row;
 mod surface_point;
 mod triangle_rows;

@@ -83,6 +83,20 @@ pub(crate) fn surface_point(
     }
 }
 
+/// Whether the point of the face's plane below `p` belongs to the face: whether the face of
+/// `on_face` is what `p`, lifted off its plane, projects onto.
+pub(crate) fn is_over_face(obstacle: &Obstacle, on_face: &SurfacePoint, p: &Vec3, scales: &Scales) -> bool {
+    let height = on_face.normal.dot(&(p - on_face.point));
+    let lifted = p + on_face.normal * (scales.shift - height);
+    let Some(hit) = project(obstacle, &lifted) else {
+        return false;
+    };
+    let offset = lifted - hit.point;
+    let beside = offset - on_face.normal * on_face.normal.dot(&offset);
+    // f32 keeps 6e-8 of a coordinate; a few of those.
+    !hit.inside && beside.norm() <= 3e-7 * lifted.norm()
+}
+
 /// In `f64` throughout.
 fn on_ball(radius: f64, p: &Vec3, outward: &Vec3) -> Option<SurfacePoint> {
     let distance = p.norm();

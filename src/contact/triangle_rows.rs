@@ -1,5 +1,6 @@
-//! Rows inside soft triangles and on their edges: what nodes miss, as a ball or a box's corner
-//! smaller than a triangle.
+//! Rows inside soft triangles and on their edges, from the closest points of a triangle and an
+//! obstacle: what nodes, face rims and corners miss, as a ball smaller than a triangle, or a sharp
+//! edge across one.
 //!
 //! The closest points are taken with the triangle shifted back into its body, where the two are
 //! apart and the direction between them is sound, and the gap without the shift.
@@ -22,20 +23,20 @@ pub(crate) struct TrianglePoint {
 const CORNER: f64 = 1.0e-3;
 /// Cosine beyond which a normal faces the triangle.
 const FACING: f64 = -0.05;
+/// Cosine beyond which two rows push the same way.
+const PARALLEL: f64 = 0.9;
 
-/// The contact of the obstacle with the inside or an edge of a triangle; `None` where the rows of
-/// the nodes (`corner_rows`) say it already, or there is none within `reach` [m].
-pub(crate) fn triangle_point(
+/// The contact of the obstacle with the inside or an edge of a triangle; `None` where there is none
+/// within `reach` [m], or the rows that the triangle has already (`known`) say it: among parallel
+/// surfaces the closest points are any points, and would be others in every step.
+pub(crate) fn triangle_point<'a>(
     obstacle: &Obstacle,
     corners: &[Vec3; 3],
-    corner_rows: &[Option<SurfacePoint>; 3],
+    known: impl Iterator<Item = &'a SurfacePoint>,
     reach: f64,
     scales: &Scales,
 ) -> Option<TrianglePoint> {
     let outward = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).try_normalize(0.0)?;
-    if on_one_plane(corners, corner_rows, scales.band) {
-        return None;
-    }
     let back = corners.map(|c| c - outward * scales.shift);
     let [a, b, c] = back.each_ref().map(to_real);
     let far = (reach + scales.shift) as f32;
@@ -61,36 +62,13 @@ pub(crate) fn triangle_point(
         gap,
         flat: false,
     };
-    let said = implied_gap(&weights, corner_rows, &normal);
-    (gap < reach && said.is_none_or(|said| gap < said - scales.band))
-        .then_some(TrianglePoint { weights, surface })
+    let parallel = known.filter(|k| k.normal.dot(&normal) > PARALLEL);
+    let said = parallel.map(|k| k.gap).fold(f64::INFINITY, f64::min);
+    (gap < reach && gap < said - scales.band).then_some(TrianglePoint { weights, surface })
 }
 
-/// Whether all three corners have rows with the same plane face: the triangle has nothing to add.
-fn on_one_plane(corners: &[Vec3; 3], rows: &[Option<SurfacePoint>; 3], band: f64) -> bool {
-    let [Some(a), Some(b), Some(c)] = rows else {
-        return false;
-    };
-    let agrees = |other: &SurfacePoint, corner: &Vec3| {
-        let plane_gap = a.normal.dot(&(corner - a.point));
-        other.flat && other.normal.dot(&a.normal) > 1.0 - 1e-6 && (plane_gap - other.gap).abs() < band
-    };
-    a.flat && agrees(b, &corners[1]) && agrees(c, &corners[2])
-}
-
-/// What the rows of the corners say about the gap at a point between them.
-fn implied_gap(weights: &[f64; 3], rows: &[Option<SurfacePoint>; 3], normal: &Vec3) -> Option<f64> {
-    let mut gap = 0.0;
-    for (w, row) in weights.iter().zip(rows) {
-        if *w > 0.0 {
-            let row = row.as_ref().filter(|r| r.normal.dot(normal) > 0.99)?;
-            gap += w * row.gap;
-        }
-    }
-    Some(gap)
-}
-
-fn barycentric([a, b, c]: &[Vec3; 3], p: &Vec3) -> Option<[f64; 3]> {
+/// Weights of the corners at the foot of `p` in the plane of a triangle.
+pub(crate) fn barycentric([a, b, c]: &[Vec3; 3], p: &Vec3) -> Option<[f64; 3]> {
     let (u, v, w) = (b - a, c - a, p - a);
     let (uu, uv, vv) = (u.dot(&u), u.dot(&v), v.dot(&v));
     let (wu, wv) = (w.dot(&u), w.dot(&v));

@@ -17,6 +17,8 @@ pub(crate) struct Surface {
     pub edges: Vec<[u32; 2]>,
     /// Edges of each triangle, the k-th opposite corner k.
     pub triangle_edges: Vec<[u32; 3]>,
+    /// The two triangles on each edge.
+    pub edge_triangles: Vec<[u32; 2]>,
     /// Index into `nodes` per mesh node; `u32::MAX` inside the body.
     pub index_of_node: Vec<u32>,
     /// Mean length of the edges at rest [m].
@@ -39,10 +41,17 @@ impl Surface {
         let find = |a: u32, b: u32| {
             edges.binary_search(&[a.min(b), a.max(b)]).unwrap_or(0) as u32
         };
-        let triangle_edges = triangles
+        let triangle_edges: Vec<[u32; 3]> = triangles
             .iter()
             .map(|&[a, b, c]| [find(b, c), find(c, a), find(a, b)])
             .collect();
+        let mut edge_triangles = vec![[u32::MAX; 2]; edges.len()];
+        for (t, of_triangle) in triangle_edges.iter().enumerate() {
+            for &e in of_triangle {
+                let pair = &mut edge_triangles[e as usize];
+                pair[usize::from(pair[0] != u32::MAX)] = t as u32;
+            }
+        }
         let length = |e: &[u32; 2]| (rest[e[0] as usize] - rest[e[1] as usize]).norm();
         let mean_edge = edges.iter().map(length).sum::<f64>() / edges.len().max(1) as f64;
         Self {
@@ -50,6 +59,7 @@ impl Surface {
             nodes,
             edges,
             triangle_edges,
+            edge_triangles,
             index_of_node,
             mean_edge,
         }

@@ -60,7 +60,6 @@ impl BodyWork {
             let obstacle = &scene.obstacles[o as usize];
             let pair = Pair {
                 body: index,
-                obstacle: o as usize,
                 friction,
                 restitution,
             };

@@ -1,0 +1,109 @@
+//! Rows where the rim of an obstacle's face crosses an edge of the body, and where a corner of the
+//! obstacle stands on a triangle of the body.
+//!
+//! A flat face on a flat surface touches everywhere at once; what carries it are the corners of the
+//! overlap: nodes under the face, body edges under its rim, and its own corners. They are found
+//! as such, one by one, so that they are the same ones in every step.
+
+use super::obstacle::Obstacle;
+use super::surface_point::{Scales, SurfacePoint, is_over_face};
+use super::triangle_rows::barycentric;
+use crate::math::{Vec3, from_real};
+use parry3d::bounding_volume::Aabb;
+use parry3d::math::Vector;
+use parry3d::shape::{Shape, TypedShape};
+
+/// Cosine beyond which a face looks at the body's surface.
+const FACING: f64 = -0.1;
+/// Halvings of an edge: to 6e-8 of its length, the resolution of `f32`.
+const HALVINGS: usize = 24;
+/// Nearer to the node than this part of the edge the node's own row serves.
+const AT_NODE: f64 = 1.0e-3;
+
+/// The point of the body edge from `inner`, whose row `on_face` is with a plane face, to `outer`,
+/// beyond that face, where the edge passes under the face's rim: its place on the edge (0 at
+/// `inner`) and its row. `outward` is the body's normal at the edge.
+pub(crate) fn rim_crossing(
+    obstacle: &Obstacle,
+    on_face: &SurfacePoint,
+    inner: &Vec3,
+    outer: &Vec3,
+    outward: &Vec3,
+    scales: &Scales,
+) -> Option<(f64, SurfacePoint)> {
+    let faces = on_face.normal.dot(outward) < FACING;
+    if !faces || !is_over_face(obstacle, on_face, inner, scales) || is_over_face(obstacle, on_face, outer, scales) {
+        return None;
+    }
+    let at = |t: f64| inner + (outer - inner) * t;
+    let (mut over, mut beyond) = (0.0, 1.0);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (over + beyond);
+        if is_over_face(obstacle, on_face, &at(middle), scales) {
+            over = middle;
+        } else {
+            beyond = middle;
+        }
+    }
+    let p = at(over);
+    let gap = on_face.normal.dot(&(p - on_face.point));
+    let row = SurfacePoint {
+        point: p - on_face.normal * gap,
+        gap,
+        ..*on_face
+    };
+    (over > AT_NODE && gap > -2.0 * scales.shift).then_some((over, row))
+}
+
+/// Corners of an obstacle in its own frame, within `region`, each with a number of its own.
+pub(crate) fn corners_in(obstacle: &Obstacle, region: &Aabb, found: &mut Vec<(u32, Vec3)>) {
+    found.clear();
+    let mut take = |number: u32, corner: Vector| {
+        if region.contains_local_point(corner) {
+            found.push((number, from_real(corner)));
+        }
+    };
+    match obstacle.shape.as_typed_shape() {
+        TypedShape::Cuboid(cuboid) => {
+            let corners = cuboid.compute_local_aabb().vertices();
+            corners.iter().zip(0..).for_each(|(&corner, number)| take(number, corner));
+        }
+        TypedShape::ConvexPolyhedron(hull) => {
+            hull.points().iter().zip(0..).for_each(|(&corner, number)| take(number, corner));
+        }
+        TypedShape::TriMesh(mesh) => {
+            for triangle in mesh.bvh().intersect_aabb(region) {
+                for number in mesh.indices()[triangle as usize] {
+                    take(number, mesh.vertices()[number as usize]);
+                }
+            }
+            found.sort_by_key(|(number, _)| *number);
+            found.dedup_by_key(|(number, _)| *number);
+        }
+        _ => {}
+    }
+}
+
+/// The row of an obstacle's corner on a triangle of the body with these `corners`, and the weights
+/// of their nodes in it; `None` if the corner is not over the triangle, or further than `reach` from
+/// it.
+pub(crate) fn corner_on_triangle(
+    corner: &Vec3,
+    corners: &[Vec3; 3],
+    reach: f64,
+    scales: &Scales,
+) -> Option<([f64; 3], SurfacePoint)> {
+    let outward = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).try_normalize(0.0)?;
+    let gap = outward.dot(&(corner - corners[0]));
+    if gap > reach || gap < -2.0 * scales.shift {
+        return None;
+    }
+    let weights = barycentric(corners, corner)?;
+    let row = SurfacePoint {
+        point: *corner,
+        normal: -outward,
+        gap,
+        flat: false,
+    };
+    weights.iter().all(|w| *w >= 0.0).then_some((weights, row))
+}
