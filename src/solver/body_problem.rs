@@ -34,6 +34,8 @@ pub(crate) struct BodyProblem {
     pub trial: Iterate,
     /// Contact forces on the nodes [N].
     pub contact_force: Vec<Vec3>,
+    /// What the last contact problem added to them [N].
+    pub contact_change: Vec<Vec3>,
     pub metric: Metric,
     /// Factor c ≥ 1 on A, raised by the guard.
     pub scaling: f64,
@@ -75,6 +77,7 @@ impl BodyProblem {
             current: Iterate::default(),
             trial: Iterate::default(),
             contact_force: vec![Vec3::zeros(); n],
+            contact_change: Vec::new(),
             metric: Metric::default(),
             scaling: 1.0,
             guard_retries: 0,
@@ -171,16 +174,17 @@ impl BodyProblem {
         })
     }
 
-    /// Sets the trial to `x + P r/c`.
+    /// Sets the trial to `x + P(r + Jᵀλ⁰)/c`.
     pub fn free_step(&mut self, factor: &SystemFactor) {
+        let force = self.free_residual();
         self.trial.x.clone_from(&self.current.x);
-        self.metric.apply(factor, &self.current.r, &mut self.step);
+        self.metric.apply(factor, &force, &mut self.step);
         self.add_step();
     }
 
-    /// Adds `P Jᵀλ/c` to the trial.
+    /// Adds `P Jᵀ(λ − λ⁰)/c` to the trial.
     pub fn contact_step(&mut self, factor: &SystemFactor) {
-        self.metric.apply(factor, &self.contact_force, &mut self.step);
+        self.metric.apply(factor, &self.contact_change, &mut self.step);
         self.add_step();
     }
 
@@ -201,9 +205,10 @@ impl BodyProblem {
         }
     }
 
-    /// The residual, zero at pinned nodes [N].
+    /// `r + Jᵀλ⁰`, zero at pinned nodes [N].
     pub fn free_residual(&self) -> Vec<Vec3> {
-        let mut r = self.current.r.clone();
+        let sums = self.current.r.iter().zip(&self.contact_force).map(|(r, f)| r + f);
+        let mut r: Vec<Vec3> = sums.collect();
         self.key.pins.iter().for_each(|&p| r[p as usize] = Vec3::zeros());
         r
     }

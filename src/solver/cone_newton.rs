@@ -114,6 +114,11 @@ impl ConeSolver {
                 done
             })
         };
+        let at_once = climb(self, &[(EPSILON, 0)]);
+        if at_once {
+            // Good as it is: not a bit of it changes, so nothing has to be done again.
+            return work;
+        }
         let done = climb(self, &[(EPSILON, WARM_STEPS)])
             || climb(self, &[(1e-2, RUNG_STEPS), (EPSILON, RUNG_STEPS)])
             || climb(self, &LONG_LADDER.map(|e| (e, RUNG_STEPS)));

@@ -22,7 +22,10 @@ pub(crate) struct ContactSystem {
     /// What each gap has to reach at the end of the step [m]: restitution and bounded recovery.
     goals: Vec<f64>,
     g_free: Vec<f64>,
+    /// W λ.
     slips: Vec<f64>,
+    before: Vec<f64>,
+    reactions: Vec<Reaction>,
 }
 
 /// Limits that the user sets per world.
@@ -44,8 +47,8 @@ impl ContactSystem {
         self.rows.is_empty()
     }
 
-    /// Packs the rows for a step of `h` [s], with their warm starts.
-    pub fn begin(&mut self, bodies: &[BodyProblem], partners: &[Partner], h: f64, limits: &ContactLimits) {
+    /// Packs the rows for a step of `h` [s], with their warm starts, which are laid on the nodes.
+    pub fn begin(&mut self, bodies: &mut [BodyProblem], partners: &[Partner], h: f64, limits: &ContactLimits) {
         self.problem.offsets.clear();
         self.problem.offsets.push(0);
         self.problem.friction.clear();
@@ -59,6 +62,7 @@ impl ContactSystem {
             self.problem.friction.push(row.friction);
             self.goals.push(goal(row, bodies, partners, h, limits));
         }
+        self.lay_forces(bodies);
     }
 
     /// Assembles W for the current frames and scalings of the bodies.
@@ -83,15 +87,32 @@ impl ContactSystem {
         self.problem.W = W;
     }
 
-    /// Takes the gaps at the bodies' trial positions, solves for λ, and lays the forces on the nodes
-    /// of the bodies.
-    pub fn solve(&mut self, bodies: &mut [BodyProblem], partners: &[Partner], h: f64, tolerance: ConeTolerance) -> ConeWork {
+    /// Takes the gaps at the bodies' trial positions, to which the present forces have brought them,
+    /// and improves the forces; tells what that took, and whether they have changed. What has to be
+    /// applied to the bodies is the change, in their `contact_change`.
+    pub fn solve(
+        &mut self,
+        bodies: &mut [BodyProblem],
+        partners: &[Partner],
+        h: f64,
+        tolerance: ConeTolerance,
+    ) -> (ConeWork, bool) {
+        self.reactions.clear();
+        self.reactions.resize(partners.len(), Reaction::default());
+        let mut reactions = std::mem::take(&mut self.reactions);
+        self.add_reactions(partners, h, &mut reactions);
+        self.problem.multiply(&self.lambda, &mut self.slips);
         self.g_free.clear();
         for (row, goal) in self.rows.iter().zip(&self.goals) {
-            let moved = relative_motion(row, bodies, partners, h);
-            self.g_free.push(row.frame[0].dot(&moved) + goal);
-            self.g_free.extend(row.directions()[1..].iter().map(|t| t.dot(&moved)));
+            let moved = relative_motion(row, bodies, partners, &reactions, h);
+            let of_forces = &self.slips[self.g_free.len()..];
+            let motions = row.directions().iter().map(|d| d.dot(&moved)).zip(of_forces);
+            let first = self.g_free.len();
+            self.g_free.extend(motions.map(|(motion, by_forces)| motion - by_forces));
+            self.g_free[first] += goal;
         }
+        self.reactions = reactions;
+        self.before.clone_from(&self.lambda);
         let mut work = ConeWork::default();
         let slides = self.problem.friction.iter().any(|mu| *mu > 0.0);
         for _ in 0..if slides { SHIFT_ROUNDS } else { 1 } {
@@ -105,8 +126,19 @@ impl ContactSystem {
             work.failures += done.failures;
             self.update_shifts();
         }
-        self.lay_forces(bodies);
-        work
+        let changed = self.before != self.lambda;
+        if changed {
+            for body in bodies.iter_mut() {
+                body.contact_change.clone_from(&body.contact_force);
+            }
+            self.lay_forces(bodies);
+            for body in bodies.iter_mut() {
+                for (change, force) in body.contact_change.iter_mut().zip(&body.contact_force) {
+                    *change = force - *change;
+                }
+            }
+        }
+        (work, changed)
     }
 
     /// σ = μ‖slip‖ of contacts that carry, 0 of open ones.
@@ -188,15 +220,25 @@ fn goal(
     row.gap.max(-limits.recovery_speed * h)
 }
 
-/// How far side 0 has moved against side 1 since the start of the step, at the trial positions [m].
-fn relative_motion(row: &Row, bodies: &[BodyProblem], partners: &[Partner], h: f64) -> Vec3 {
+/// How far side 0 has moved against side 1 since the start of the step [m]: bodies at their trial
+/// positions, partners under these reactions.
+fn relative_motion(
+    row: &Row,
+    bodies: &[BodyProblem],
+    partners: &[Partner],
+    reactions: &[Reaction],
+    h: f64,
+) -> Vec3 {
     let moved = |side: &Side| match side {
         Side::Soft { body, .. } => {
             let b = &bodies[*body];
             let nodes = side.soft_nodes();
             nodes.fold(Vec3::zeros(), |sum, (n, w)| sum + (b.trial.x[n] - b.x_start[n]) * w)
         }
-        Side::Partner { partner, point } => partners[partner.0 as usize].free_displacement(point, h),
+        Side::Partner { partner, point } => {
+            let p = partner.0 as usize;
+            partners[p].free_displacement(point, h) + partners[p].displacement_by(&reactions[p], point, h)
+        }
     };
     moved(&row.sides[0]) - moved(&row.sides[1])
 }

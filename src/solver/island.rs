@@ -1,11 +1,13 @@
 //! Bodies and partners that contacts connect, solved together.
 //!
-//! Every iteration: `y = x + P r`, the contact problem at y, `x ← y + P Jᵀλ`, and the guard. If the
-//! guard finds the energy risen, the metric is scaled (A → cA) and the iteration done again, contact
-//! problem included: shortening the step instead would break the contacts that were just solved.
+//! Every iteration: `y = x + H(r + Jᵀλ⁰)` with the last forces λ⁰, the contact problem at y for λ,
+//! `x ← y + P Jᵀ(λ − λ⁰)`, and the guard. H is P, or its quasi-Newton update: at the fixed point
+//! λ = λ⁰ both ask for `r + Jᵀλ = 0`. If the guard finds the energy risen, the metric is scaled
+//! (A → cA) and the iteration done again, contact problem included: shortening the step instead would
+//! break the contacts that were just solved.
 
 use super::body_problem::BodyProblem;
-use super::cone_newton::{ConeTolerance, ConeWork};
+use super::cone_newton::ConeTolerance;
 use super::contact_system::{ContactLimits, ContactSystem};
 use super::factor_cache::{FactorCache, SystemFactor};
 use super::lbfgs::Lbfgs;
@@ -49,15 +51,14 @@ impl Island {
             body.choose_start(factor);
         }
         if !self.contacts.is_empty() {
-            self.contacts.begin(&self.bodies, partners, h, limits);
+            self.contacts.begin(&mut self.bodies, partners, h, limits);
             self.contacts.assemble(&self.bodies, &factors, partners, h);
         }
         self.accelerations.resize_with(self.bodies.len(), Lbfgs::default);
         self.accelerations.iter_mut().for_each(Lbfgs::clear);
         let iterations = self.bodies.iter().map(|b| b.settings.max_iterations).max().unwrap_or(0);
-        for iteration in 0..iterations {
-            let last = iteration + 1 == iterations;
-            self.iterate(&factors, partners, h, limits, last);
+        for _ in 0..iterations {
+            self.iterate(&factors, partners, h, limits);
             self.report.iterations += 1;
             let converged = |b: &BodyProblem| b.residual() <= b.settings.tolerance * b.force_scale();
             if self.bodies.iter().all(converged) {
@@ -72,16 +73,12 @@ impl Island {
         partners: &[Partner],
         h: f64,
         limits: &ContactLimits,
-        last: bool,
     ) {
         loop {
             for (k, body) in self.bodies.iter_mut().enumerate() {
                 match body.settings.acceleration {
-                    // With contact the last iteration is plain: W belongs to P, not to its update.
-                    Acceleration::Lbfgs { window } if !(last && !self.contacts.is_empty()) => {
-                        self.accelerations[k].step(window, body, factors[k]);
-                    }
-                    _ => body.free_step(factors[k]),
+                    Acceleration::Lbfgs { window } => self.accelerations[k].step(window, body, factors[k]),
+                    Acceleration::None => body.free_step(factors[k]),
                 }
             }
             if !self.contacts.is_empty() {
@@ -118,12 +115,14 @@ impl Island {
             // Without gravity or forces any positive number serves as the scale of nothing.
             floor: (1e-3 * heaviest).max(1e-12),
         };
-        let work: ConeWork = self.contacts.solve(&mut self.bodies, partners, h, tolerance);
+        let (work, changed) = self.contacts.solve(&mut self.bodies, partners, h, tolerance);
         self.report.newton_steps += work.newton_steps;
         self.report.cone_factorizations += work.factorizations;
         self.report.cone_failures += work.failures;
-        for (body, factor) in self.bodies.iter_mut().zip(factors) {
-            body.contact_step(factor);
+        if changed {
+            for (body, factor) in self.bodies.iter_mut().zip(factors) {
+                body.contact_step(factor);
+            }
         }
     }
 }

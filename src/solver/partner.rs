@@ -47,6 +47,17 @@ impl Partner {
         }
     }
 
+    /// What a reaction adds to the displacement of the point `p` [m].
+    pub fn displacement_by(&self, reaction: &Reaction, p: &Vec3, h: f64) -> Vec3 {
+        match self {
+            Self::Prescribed { .. } => Vec3::zeros(),
+            Self::Rigid { com, inv_mass, inv_inertia, .. } => {
+                let angvel = inv_inertia * reaction.torque_impulse;
+                (inv_mass.component_mul(&reaction.impulse) + angvel.cross(&(p - com))) * h
+            }
+        }
+    }
+
     /// Velocity of the point `p` at the start of the step [m/s].
     pub fn velocity(&self, p: &Vec3, h: f64) -> Vec3 {
         match self {
