@@ -78,7 +78,7 @@ impl Default for SolverSettings {
 }
 
 impl SolverSettings {
-    /// Exactly this many iterations, whatever the residual.
+    /// Exactly this many iterations, unless nothing but rounding is left before.
     pub fn iterations(count: usize) -> Self {
         Self {
             max_iterations: count,

@@ -6,7 +6,8 @@ use std::time::Duration;
 /// Parameters of all bodies of a world. The defaults suit scenes in metres and kilograms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeformableParameters {
-    /// Relative accuracy to which contact forces are solved.
+    /// Relative accuracy to which contact forces are solved. At 1e-6 a symmetric stack of 1000:1
+    /// begins to sway, at 1e-8 it does not; Newton's method gets there in one more step.
     pub contact_tolerance: f64,
     /// Speed [m/s] at which overlaps found at the start of a step are undone.
     pub max_corrective_velocity: f64,
@@ -19,7 +20,7 @@ pub struct DeformableParameters {
 impl Default for DeformableParameters {
     fn default() -> Self {
         Self {
-            contact_tolerance: 1.0e-6,
+            contact_tolerance: 1.0e-8,
             max_corrective_velocity: 1.0,
             restitution_threshold: 0.5,
             column_budget: 512 << 20,

@@ -26,6 +26,8 @@ pub(crate) struct ContactSystem {
     slips: Vec<f64>,
     before: Vec<f64>,
     reactions: Vec<Reaction>,
+    /// Forces and shifts before the iteration.
+    kept: (Vec<f64>, Vec<f64>),
 }
 
 /// Limits that the user sets per world.
@@ -168,6 +170,20 @@ impl ContactSystem {
                 }
             }
         }
+    }
+
+    /// Remembers the forces for [`ContactSystem::revert`].
+    pub fn keep(&mut self) {
+        self.kept.0.clone_from(&self.lambda);
+        self.kept.1.clone_from(&self.shift);
+    }
+
+    /// Goes back to the forces that were kept.
+    pub fn revert(&mut self, bodies: &mut [BodyProblem]) {
+        self.lambda.clone_from(&self.kept.0);
+        self.shift.clone_from(&self.kept.1);
+        self.problem.multiply(&self.lambda, &mut self.slips);
+        self.lay_forces(bodies);
     }
 
     /// Force [N] of contact `i` on its side 0.

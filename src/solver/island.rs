@@ -36,6 +36,8 @@ pub(crate) struct IslandReport {
 
 /// Largest factor on A that the guard tries.
 const MAX_SCALING: f64 = 1024.0;
+/// Residual relative to the forces that is rounding and nothing else: sums of some tens of terms.
+const ROUNDING: f64 = 1.0e-12;
 
 impl Island {
     /// Does the iterations of a step of `h` [s]; results are in the bodies' `current` and in the
@@ -58,25 +60,30 @@ impl Island {
         self.accelerations.iter_mut().for_each(Lbfgs::clear);
         let iterations = self.bodies.iter().map(|b| b.settings.max_iterations).max().unwrap_or(0);
         for _ in 0..iterations {
-            self.iterate(&factors, partners, h, limits);
             self.report.iterations += 1;
-            let converged = |b: &BodyProblem| b.residual() <= b.settings.tolerance * b.force_scale();
-            if self.bodies.iter().all(converged) {
+            let stalled = !self.iterate(&factors, partners, h, limits);
+            let converged = |b: &BodyProblem| {
+                b.residual() <= b.settings.tolerance.max(ROUNDING) * b.force_scale()
+            };
+            if stalled || self.bodies.iter().all(converged) {
                 break;
             }
         }
     }
 
+    /// One iteration; false if no scaling of the metric makes it descend, and everything is left as
+    /// it was.
     fn iterate(
         &mut self,
         factors: &[&SystemFactor],
         partners: &[Partner],
         h: f64,
         limits: &ContactLimits,
-    ) {
+    ) -> bool {
+        self.contacts.keep();
         loop {
             for (k, body) in self.bodies.iter_mut().enumerate() {
-                match body.settings.acceleration {
+                match acceleration_of(body, &self.contacts) {
                     Acceleration::Lbfgs { window } => self.accelerations[k].step(window, body, factors[k]),
                     Acceleration::None => body.free_step(factors[k]),
                 }
@@ -85,27 +92,39 @@ impl Island {
                 self.solve_contacts(factors, partners, h, limits);
             }
             let mut descends = true;
-            for body in &mut self.bodies {
+            let mut rescaled = false;
+            for (body, acceleration) in self.bodies.iter_mut().zip(&mut self.accelerations) {
                 body.evaluate_trial();
-                if !body.trial_descends() && body.scaling < MAX_SCALING {
+                if body.trial_descends() {
+                    continue;
+                }
+                descends = false;
+                body.guard_retries += 1;
+                // An update that does not descend is forgotten before the metric is doubted.
+                if !acceleration.is_empty() {
+                    acceleration.clear();
+                } else if body.scaling < MAX_SCALING {
                     body.scaling *= 2.0;
-                    body.guard_retries += 1;
-                    descends = false;
+                    rescaled = true;
+                } else {
+                    self.contacts.revert(&mut self.bodies);
+                    return false;
                 }
             }
             if descends {
                 break;
             }
-            if !self.contacts.is_empty() {
+            if rescaled && !self.contacts.is_empty() {
                 self.contacts.assemble(&self.bodies, factors, partners, h);
             }
         }
-        for (k, body) in self.bodies.iter_mut().enumerate() {
-            if matches!(body.settings.acceleration, Acceleration::Lbfgs { .. }) {
-                self.accelerations[k].learn(body);
+        for (body, acceleration) in self.bodies.iter_mut().zip(&mut self.accelerations) {
+            if acceleration_of(body, &self.contacts) != Acceleration::None {
+                acceleration.learn(body);
             }
             body.accept_trial();
         }
+        true
     }
 
     fn solve_contacts(&mut self, factors: &[&SystemFactor], partners: &[Partner], h: f64, limits: &ContactLimits) {
@@ -125,4 +144,11 @@ impl Island {
             }
         }
     }
+}
+
+/// Bodies in contact that do not bend take the plain iteration: it needs two or three steps there,
+/// and a quasi-Newton update would feed the last digits of the contact forces back into them.
+fn acceleration_of(body: &BodyProblem, contacts: &ContactSystem) -> Acceleration {
+    let plain = !contacts.is_empty() && !body.metric.is_per_node();
+    if plain { Acceleration::None } else { body.settings.acceleration }
 }

@@ -22,6 +22,10 @@ struct Pair {
 }
 
 impl Lbfgs {
+    pub fn is_empty(&self) -> bool {
+        self.pairs.is_empty()
+    }
+
     pub fn clear(&mut self) {
         self.pairs.clear();
     }

@@ -193,7 +193,7 @@ impl Metric {
         block - (d.coupling[i] + d.coupling[j].transpose()) / d.total_mass + rigid
     }
 
-    /// Bits of the frames that a node's compliance depends on.
+    /// Whether every node has a frame of its own, as in bodies that bend.
     pub fn is_per_node(&self) -> bool {
         self.kind == FrameKind::PerNode
     }
