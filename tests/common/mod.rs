@@ -1,0 +1,64 @@
+//! Scenes and oracles shared by the tests.
+#![allow(dead_code)]
+
+pub mod newton;
+
+use foible3d::prelude::*;
+use rapier3d::prelude::*;
+
+/// Gravity of rapier's default world, widened from its `f32` [m/s²].
+pub const G: f64 = 9.81f32 as f64;
+/// Coefficient of friction of all scenes, on both sides.
+pub const MU: f64 = 0.5;
+
+/// A rapier world with a fixed floor whose top is y = 0.
+pub fn world_with_floor(dt: f32) -> (PhysicsWorld, ColliderHandle) {
+    let mut physics = PhysicsWorld::new();
+    physics.integration_parameters.dt = dt;
+    let body = RigidBodyBuilder::fixed().translation(Vector::Y * -0.5);
+    let collider = ColliderBuilder::cuboid(5.0, 0.5, 5.0).friction(MU as f32).restitution(0.0);
+    let (_, floor) = physics.insert(body, collider);
+    (physics, floor)
+}
+
+/// The cube of the tests: 0.4 m, 6 × 6 × 6 cells, 64 kg, its centre at `y` [m].
+pub fn cube(material: DeformableMaterial, y: f32) -> DeformableBodyBuilder {
+    DeformableBodyBuilder::cuboid(Vector::splat(0.2), [6, 6, 6])
+        .translation(Vector::Y * y)
+        .material(material.friction(MU))
+}
+
+/// Vertices of a body whose rest position satisfies a condition.
+pub fn at_rest_where(body: &DeformableBody, condition: impl Fn([f64; 3]) -> bool) -> Vec<usize> {
+    (0..body.vertex_count()).filter(|&v| condition(body.model().rest_position(v))).collect()
+}
+
+/// Mean position of some vertices [m].
+pub fn mean_position(body: &DeformableBody, vertices: &[usize]) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for &v in vertices {
+        let p = body.position(v).unwrap();
+        (0..3).for_each(|k| sum[k] += p[k] / vertices.len() as f64);
+    }
+    sum
+}
+
+/// Depth of the deepest vertex below the plane y = 0 [m].
+pub fn depth_below_floor(body: &DeformableBody) -> f64 {
+    let heights = (0..body.vertex_count()).map(|v| body.position(v).unwrap()[1]);
+    -heights.fold(f64::INFINITY, f64::min)
+}
+
+/// Kinetic, elastic and gravity energy [J].
+pub fn total_energy(body: &DeformableBody) -> f64 {
+    body.kinetic_energy() + body.elastic_energy() + body.mass() * G * body.center_of_mass()[1]
+}
+
+/// Solved until only rounding is left.
+pub fn converged() -> SolverSettings {
+    SolverSettings {
+        max_iterations: 300,
+        tolerance: 1e-9,
+        ..SolverSettings::default()
+    }
+}

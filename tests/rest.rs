@@ -1,0 +1,81 @@
+//! A cube at rest on a floor (references: at rest, Σ λ_n = m g).
+mod common;
+use common::*;
+use foible3d::prelude::*;
+
+/// Steps a cube onto the floor and checks that it lies still, carries its weight and is not in the
+/// floor.
+fn lies_still(material: DeformableMaterial, iterations: usize, dt: f32, seconds: f32) {
+    let (mut physics, floor) = world_with_floor(dt);
+    let mut world = DeformableWorld::new();
+    let settings = SolverSettings::iterations(iterations);
+    let body = world.insert(cube(material, 0.202).settings(settings)).unwrap();
+    for _ in 0..(seconds / dt).round() as usize {
+        world.step(&mut physics);
+    }
+    let (weight, what) = (world.bodies[body].mass() * G, format!("{material:?} {iterations} it., dt {dt}"));
+    let speed = world.bodies[body].max_speed();
+    assert!(speed < 1e-5, "speed {speed:e}: {what}");
+    let force = f64::from(world.contact_force(body, floor).y);
+    assert!((force / weight - 1.0).abs() < 1e-5, "force {force} of {weight}: {what}");
+    let depth = depth_below_floor(&world.bodies[body]);
+    assert!(depth < 1e-5, "penetration {depth:e}: {what}");
+}
+
+#[test]
+fn cube_lies_still_at_every_stiffness_and_iteration_count() {
+    for e in [1e5, 1e6, 1e7, 1e8, 1e9] {
+        for nu in [0.3, 0.45] {
+            for iterations in [1, 3, 10] {
+                lies_still(DeformableMaterial::new(e, nu), iterations, 1.0 / 60.0, 5.0);
+            }
+        }
+    }
+}
+
+#[test]
+fn crushed_cube_lies_still_after_ten_seconds() {
+    for nu in [0.3, 0.45] {
+        for iterations in [1, 3, 10] {
+            let material = DeformableMaterial::new(1e4, nu).stiffness_damping(0.02);
+            lies_still(material, iterations, 1.0 / 60.0, 10.0);
+        }
+    }
+}
+
+#[test]
+fn cube_lies_still_at_large_steps() {
+    for e in [1e5, 1e6, 1e7, 1e8, 1e9] {
+        for nu in [0.3, 0.45] {
+            for iterations in [1, 3, 10] {
+                lies_still(DeformableMaterial::new(e, nu), iterations, 0.1, 5.0);
+            }
+        }
+    }
+}
+
+/// Implicit Euler takes little out of small steps: the material's own damping does, 10 ms at 1e5 Pa
+/// and in proportion to the period √(ρ/E) above.
+fn damped(e: f64, nu: f64) -> DeformableMaterial {
+    DeformableMaterial::new(e, nu).stiffness_damping(0.01 * (1e5 / e).sqrt()).mass_damping(2.0)
+}
+
+#[test]
+fn cube_lies_still_at_240_steps_a_second() {
+    for e in [1e5, 1e6, 1e7, 1e8, 1e9] {
+        for nu in [0.3, 0.45] {
+            for iterations in [1, 3] {
+                lies_still(damped(e, nu), iterations, 1.0 / 240.0, 5.0);
+            }
+        }
+    }
+}
+
+#[test]
+fn cube_lies_still_at_1000_steps_a_second() {
+    for (e, nu) in [(1e5, 0.3), (1e6, 0.45), (1e7, 0.3), (1e8, 0.45), (1e9, 0.3)] {
+        for iterations in [1, 3] {
+            lies_still(damped(e, nu), iterations, 1e-3, 5.0);
+        }
+    }
+}
