@@ -98,8 +98,8 @@ fn bars_bent_and_twisted_by_180_degrees_never_gain_energy() {
 
 #[test]
 fn axial_wave_has_the_period_of_a_fixed_free_bar() {
-    // f = √(E/ρ)/(4L): 0.25 s period at 1.6e4 Pa·m… chosen so that 1/2000 s steps resolve it; implicit
-    // Euler damps but hardly shifts the period.
+    // f = √(E/ρ)/(4L): a period of 0.32 s at 1.6e5 Pa. Implicit Euler damps the wave at 2000 steps a
+    // second but hardly shifts its period.
     let (e, dt) = (1.6e5, 5e-4f32);
     let mut physics = PhysicsWorld::new();
     physics.gravity = Vector::ZERO;

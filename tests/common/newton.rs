@@ -1,6 +1,8 @@
 //! A static minimiser of its own: linear corotated energy plus gravity, Newton's method with
 //! conjugate gradients on the exact tangent. Shares no code with the engine.
 
+#![allow(non_snake_case)]
+
 use nalgebra::{Matrix3, Vector3};
 
 type M = Matrix3<f64>;
