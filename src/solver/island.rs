@@ -34,6 +34,16 @@ pub(crate) struct IslandReport {
     pub unsolvable: bool,
 }
 
+/// What became of an iteration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Outcome {
+    Descended,
+    /// Descended, by a step that turned a body so far that contacts have to be solved again.
+    Turned,
+    /// No scaling of the metric makes it descend: everything is as it was.
+    Stalled,
+}
+
 /// Largest factor on A that the guard tries.
 const MAX_SCALING: f64 = 1024.0;
 /// Residual relative to the forces that is rounding and nothing else: sums of some tens of terms.
@@ -59,29 +69,43 @@ impl Island {
         self.accelerations.resize_with(self.bodies.len(), Lbfgs::default);
         self.accelerations.iter_mut().for_each(Lbfgs::clear);
         let iterations = self.bodies.iter().map(|b| b.settings.max_iterations).max().unwrap_or(0);
-        for _ in 0..iterations {
+        for iteration in 1..=iterations {
             self.report.iterations += 1;
-            let stalled = !self.iterate(&factors, partners, h, limits);
+            let last = iteration == iterations;
+            let outcome = self.iterate(&factors, partners, h, limits, last);
             let converged = |b: &BodyProblem| {
                 b.residual() <= b.settings.tolerance.max(ROUNDING) * b.force_scale()
             };
-            if stalled || self.bodies.iter().all(converged) {
+            let done = match outcome {
+                Outcome::Stalled => true,
+                Outcome::Turned => false,
+                Outcome::Descended => self.bodies.iter().all(converged),
+            };
+            if done {
                 break;
+            }
+            if !self.contacts.is_empty() {
+                let turned = self.bodies.iter_mut().filter_map(|b| b.refresh_frame().then_some(()));
+                if turned.count() > 0 {
+                    self.contacts.assemble(&self.bodies, &factors, partners, h);
+                }
             }
         }
     }
 
-    /// One iteration; false if no scaling of the metric makes it descend, and everything is left as
-    /// it was.
+    /// One iteration.
     fn iterate(
         &mut self,
         factors: &[&SystemFactor],
         partners: &[Partner],
         h: f64,
         limits: &ContactLimits,
-    ) -> bool {
+        last: bool,
+    ) -> Outcome {
         self.contacts.keep();
+        let mut outcome;
         loop {
+            outcome = Outcome::Descended;
             for (k, body) in self.bodies.iter_mut().enumerate() {
                 match acceleration_of(body, &self.contacts) {
                     Acceleration::Lbfgs { window } => self.accelerations[k].step(window, body, factors[k]),
@@ -90,6 +114,14 @@ impl Island {
             }
             if !self.contacts.is_empty() {
                 self.solve_contacts(factors, partners, h, limits);
+                // The last iteration leaves contacts as they were solved for.
+                if !last {
+                    for body in &mut self.bodies {
+                        if body.bend_step_to_rotation() {
+                            outcome = Outcome::Turned;
+                        }
+                    }
+                }
             }
             let mut descends = true;
             let mut rescaled = false;
@@ -108,7 +140,7 @@ impl Island {
                     rescaled = true;
                 } else {
                     self.contacts.revert(&mut self.bodies);
-                    return false;
+                    return Outcome::Stalled;
                 }
             }
             if descends {
@@ -124,7 +156,7 @@ impl Island {
             }
             body.accept_trial();
         }
-        true
+        outcome
     }
 
     fn solve_contacts(&mut self, factors: &[&SystemFactor], partners: &[Partner], h: f64, limits: &ContactLimits) {

@@ -4,7 +4,7 @@
 //! mode is put back exactly: with masses m_i (total m), 1 the rigid translation,
 //! `P = (I − 1mᵀ/m) P₀ (I − m1ᵀ/m) + h²/(1 + αh)/m · 11ᵀ`.
 //!
-//! Frames are rounded to about 10⁻⁴ rad. That costs no convergence to speak of, and at rest they
+//! Frames are rounded to about 10⁻⁶ rad. That costs no convergence to speak of, and at rest they
 //! are the same bits in every step, so whatever was made from them can be used again.
 
 use super::factor::FactorScratch;
@@ -64,6 +64,19 @@ impl Metric {
         self.kind = FrameKind::Floating;
         self.floating = rounded(rotation);
         self.deflation.active = false;
+    }
+
+    /// Turns the body's one frame to `rotation` if that differs by more than `angle` [rad]; true if so.
+    pub fn turn_floating(&mut self, rotation: &Mat3, angle: f64) -> bool {
+        if self.kind != FrameKind::Floating {
+            return false;
+        }
+        // ‖R − Q‖ = 2√2 sin(θ/2).
+        let differs = (rotation - self.floating).norm() > angle * std::f64::consts::SQRT_2;
+        if differs {
+            self.set_floating(rotation);
+        }
+        differs
     }
 
     /// One frame per node, of the elements at `x`; `free` bodies (without pins) get their
@@ -199,11 +212,11 @@ impl Metric {
     }
 }
 
-/// A rotation rounded to quaternion components of 2⁻¹³.
+/// A rotation rounded to quaternion components of 2⁻²⁰.
 fn rounded(rotation: &Mat3) -> Mat3 {
     let R = nalgebra::Rotation3::from_matrix_unchecked(*rotation);
     let q = nalgebra::UnitQuaternion::from_rotation_matrix(&R);
-    let coarse = q.coords.map(|c| (c * 8192.0).round() / 8192.0);
+    let coarse = q.coords.map(|c| (c * 1048576.0).round() / 1048576.0);
     nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::from_vector(coarse))
         .to_rotation_matrix()
         .into_inner()
