@@ -100,8 +100,8 @@ fn cube_thrown_on_its_corner_comes_to_rest_without_gaining_energy() {
 fn crushed_cube_stays_finite_and_comes_back_to_rest() {
     for nu in [0.3, 0.45] {
         for iterations in [1, 3, 10] {
-            // Undamped it would wobble for minutes: at 0.3 Hz implicit Euler takes little out.
-            let material = DeformableMaterial::new(1e4, nu).stiffness_damping(0.02);
+            // Undamped it would wobble and refold for minutes: slow motion loses little to implicit Euler.
+            let material = DeformableMaterial::new(1e4, nu).stiffness_damping(0.05);
             let t = throw(material, SolverSettings::iterations(iterations));
             assert!(t.enabled && t.speed < 1e-3, "ν {nu}, {iterations} it.: {:e} m/s", t.speed);
         }

@@ -8,7 +8,7 @@
 
 use super::obstacle::{Obstacle, Solidity};
 use crate::math::{Vec3, from_real, to_real};
-use parry3d::shape::FeatureId;
+use parry3d::shape::{FeatureId, Shape, SharedShape, TypedShape};
 
 /// In the obstacle's frame.
 #[derive(Clone, Copy, Debug)]
@@ -121,29 +121,53 @@ struct Projection {
 }
 
 fn project(obstacle: &Obstacle, p: &Vec3) -> Option<Projection> {
-    let shape = &obstacle.shape;
-    let (projection, feature) = shape.project_local_point_and_get_feature(to_real(p));
+    let (core, radius) = core_and_radius(&obstacle.shape);
+    let (projection, feature) = core.project_local_point_and_get_feature(to_real(p));
     let point = from_real(projection.point);
     if !point.iter().all(|c| c.is_finite()) {
         return None;
     }
     let offset = p - point;
     let distance = offset.norm();
-    // Capsules call all of themselves one face; only plane ones have a normal here.
-    let plane = matches!(feature, FeatureId::Face(_)) && shape.as_capsule().is_none();
-    let normal = || shape.feature_normal_at_point(projection.subshape, feature, projection.point);
+    let plane = matches!(feature, FeatureId::Face(_));
+    let normal = || core.feature_normal_at_point(projection.subshape, feature, projection.point);
     let face = if plane { normal().map(from_real) } else { None };
     let face = face.and_then(|n| n.try_normalize(0.5)).or_else(|| {
-        let half_space = shape.as_halfspace()?;
+        let half_space = core.as_halfspace()?;
         Some(from_real(half_space.normal).normalize())
     });
+    let direction = (distance > 0.0).then(|| offset / distance);
+    if radius == 0.0 {
+        return Some(Projection { point, inside: projection.is_inside, distance, direction, face });
+    }
+    // The surface is `radius` off the core, on the side where p is.
+    let outward = match direction {
+        Some(d) if projection.is_inside => -d,
+        Some(d) => d,
+        None => face?,
+    };
+    let depth = if projection.is_inside { distance + radius } else { radius - distance };
     Some(Projection {
-        point,
-        inside: projection.is_inside,
-        distance,
-        direction: (distance > 0.0).then(|| offset / distance),
-        face,
+        point: point + outward * radius,
+        inside: depth > 0.0,
+        distance: depth.abs(),
+        direction: (depth != 0.0).then(|| if depth > 0.0 { -outward } else { outward }),
+        face: face.filter(|n| n.dot(&outward) > 0.999),
     })
+}
+
+/// Round shapes as a core and the thickness around it: projections onto the core are exact where
+/// those onto the round shape iterate.
+fn core_and_radius(shape: &SharedShape) -> (&dyn Shape, f64) {
+    match shape.as_typed_shape() {
+        TypedShape::Capsule(s) => (&s.segment, s.radius.into()),
+        TypedShape::RoundCuboid(s) => (&s.inner_shape, s.border_radius.into()),
+        TypedShape::RoundTriangle(s) => (&s.inner_shape, s.border_radius.into()),
+        TypedShape::RoundCylinder(s) => (&s.inner_shape, s.border_radius.into()),
+        TypedShape::RoundCone(s) => (&s.inner_shape, s.border_radius.into()),
+        TypedShape::RoundConvexPolyhedron(s) => (&s.inner_shape, s.border_radius.into()),
+        _ => (&*shape.0, 0.0),
+    }
 }
 
 /// The exact normal of the face if that is what the direction means, up to sign.

@@ -280,8 +280,8 @@ fn store(body: &mut DeformableBody, work: &IslandWork, local: usize, h: f64, cou
         *v = (new - old) / h;
         *x = *new;
     }
-    for pin in &mut body.pins {
-        pin.force = problem.pin_force(pin.node as usize);
+    for (k, pin) in body.pins.iter_mut().enumerate() {
+        pin.force = problem.pin_force(k);
     }
     work.memory_of(local, h, &mut body.state.contacts);
     body.report.iterations = work.island.report.iterations;

@@ -46,6 +46,8 @@ pub(crate) struct BodyProblem {
     /// A force that counts as large for this body [N].
     pub weight: f64,
     step: Vec<Vec3>,
+    /// Where the pinned nodes would go by inertia and external forces.
+    pinned_inertia: Vec<Vec3>,
 }
 
 /// A point of the iteration with what was evaluated there.
@@ -86,6 +88,7 @@ impl BodyProblem {
             guard_retries: 0,
             weight: 0.0,
             step: vec![Vec3::zeros(); n],
+            pinned_inertia: Vec::new(),
         };
         problem.begin(body, h, gravity);
         problem
@@ -111,7 +114,9 @@ impl BodyProblem {
             body.state.x[i] + body.state.v[i] * h + acceleration * (h * h)
         };
         self.target.extend((0..n).map(to_target));
+        self.pinned_inertia.clear();
         for pin in &body.pins {
+            self.pinned_inertia.push(self.target[pin.node as usize]);
             self.target[pin.node as usize] = pin.target;
         }
         self.contact_force.clear();
@@ -265,9 +270,11 @@ impl BodyProblem {
         out
     }
 
-    /// Force [N] with which a pin holds its node.
-    pub fn pin_force(&self, node: usize) -> Vec3 {
-        -(self.current.r[node] + self.contact_force[node])
+    /// Force [N] with which the `k`-th pin holds its node.
+    pub fn pin_force(&self, k: usize) -> Vec3 {
+        let node = self.key.pins[k] as usize;
+        let inertia = (self.pinned_inertia[k] - self.current.x[node]) * (self.masses[node] / (self.h * self.h));
+        -(inertia + self.current.r[node] + self.contact_force[node])
     }
 
     pub fn evaluate_current(&mut self) {

@@ -1,7 +1,7 @@
 //! Columns of `A⁻¹` over the surface nodes, made when a node first comes near a contact.
 //!
-//! Of each column only the rows of surface nodes are kept, in `f32`: contacts need no more, and the
-//! residual that they are judged by is `f64`. Blocks are in the rest frame; frames rotate them.
+//! Of each column only the rows of surface nodes are kept. Blocks are in the rest frame; frames
+//! rotate them.
 
 use super::factor::{BATCH, Factor, FactorScratch, Symbolic};
 use super::system::dimension;
@@ -15,7 +15,7 @@ pub(crate) struct Columns {
     /// Unknowns per node.
     d: usize,
     /// Per surface node: `d` columns of `d·|S|` numbers.
-    columns: Vec<Option<Box<[f32]>>>,
+    columns: Vec<Option<Box<[f64]>>>,
     made: usize,
 }
 
@@ -64,7 +64,7 @@ impl Columns {
                 }
                 let column = |c: usize| &batch[n * (d * k + c)..][..n];
                 let kept = (0..d).flat_map(|c| {
-                    nodes.iter().flat_map(move |&i| (0..d).map(move |r| column(c)[d * i as usize + r] as f32))
+                    nodes.iter().flat_map(move |&i| (0..d).map(move |r| column(c)[d * i as usize + r]))
                 });
                 self.columns[s as usize] = Some(kept.collect());
             }
@@ -83,15 +83,15 @@ impl Columns {
             return Mat3::zeros();
         };
         if self.d == 1 {
-            return Mat3::from_diagonal_element(column[i] as f64);
+            return Mat3::from_diagonal_element(column[i]);
         }
         let stride = 3 * self.columns.len();
-        let block = Mat3::from_fn(|r, c| column[stride * c + 3 * i + r] as f64);
+        let block = Mat3::from_fn(|r, c| column[stride * c + 3 * i + r]);
         if i == j { (block + block.transpose()) * 0.5 } else { block }
     }
 
     pub fn bytes(&self) -> usize {
-        self.made * self.columns.len() * self.d * self.d * size_of::<f32>()
+        self.made * self.columns.len() * self.d * self.d * size_of::<f64>()
     }
 
     pub fn clear(&mut self) {

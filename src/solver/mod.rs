@@ -14,6 +14,8 @@ mod lbfgs;
 mod metric;
 mod partner;
 mod system;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use body_problem::BodyProblem;
 pub(crate) use contact_system::ContactLimits;

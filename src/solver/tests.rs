@@ -1,0 +1,289 @@
+//! The solver against dense and brute-force twins.
+
+use super::body_problem::BodyProblem;
+use super::cone_newton::{ConeProblem, ConeSolver, ConeTolerance};
+use super::contact_system::{ContactLimits, ContactSystem};
+use super::factor_cache::FactorCache;
+use super::island::Island;
+use super::partner::{Partner, Reaction};
+use super::system::{FactorKey, assemble};
+use crate::body::{ContactKey, DeformableBody, DeformableBodyBuilder, Frames, SolverSettings, SystemMatrix};
+use crate::contact::{PartnerId, Row, Side, cone};
+use crate::material::DeformableMaterial;
+use crate::math::{Mat3, Vec3};
+use nalgebra::{DMatrix, DVector};
+use proptest::prelude::*;
+use rapier3d::math::Vector;
+
+const H: f64 = 1.0 / 60.0;
+const LIMITS: ContactLimits = ContactLimits { recovery_speed: 1.0, restitution_threshold: 0.5, tolerance: 1e-12 };
+
+fn body(system: SystemMatrix, frames: Frames, pinned: bool) -> DeformableBody {
+    let settings = SolverSettings { system, frames, ..SolverSettings::iterations(1) };
+    let builder = DeformableBodyBuilder::cuboid(Vector::new(0.3, 0.2, 0.2), [3, 2, 2])
+        .material(DeformableMaterial::new(1e5, 0.4))
+        .settings(settings);
+    let builder = if pinned { builder.pinned(|x| x.x < -0.29) } else { builder };
+    builder.build().unwrap()
+}
+
+/// A body with its factor and all columns, bent a little so that frames differ.
+fn prepared(system: SystemMatrix, frames: Frames, pinned: bool) -> (FactorCache, BodyProblem) {
+    let mut body = body(system, frames, pinned);
+    for x in &mut body.state.x {
+        let s = 0.5 * (x.x + 0.3);
+        *x = Vec3::new(x.x, x.y + s * s, x.z + 0.1 * s * x.y);
+    }
+    let mut cache = FactorCache::default();
+    let all = 0..body.model.surface.nodes.len() as u32;
+    cache.prepare(&FactorKey::new(&body, H), &body, H, all).unwrap();
+    let mut problem = BodyProblem::new(&body, H, &Vec3::new(0.0, -9.81, 0.0));
+    problem.choose_start(cache.get(&problem.key).unwrap());
+    (cache, problem)
+}
+
+/// The dense matrix of a body.
+fn dense(body: &DeformableBody, system: SystemMatrix) -> DMatrix<f64> {
+    let symbolic = super::system::symbolic(&body.model, system).unwrap();
+    let values = assemble(&body.model, &body.material, &[], system, H, &symbolic);
+    let n = symbolic.column_starts().len() - 1;
+    let mut A = DMatrix::zeros(n, n);
+    for j in 0..n {
+        for k in symbolic.column_starts()[j]..symbolic.column_starts()[j + 1] {
+            let i = symbolic.rows()[k];
+            (A[(i, j)], A[(j, i)]) = (values[k], values[k]);
+        }
+    }
+    A
+}
+
+#[test]
+fn contact_set_elimination_is_the_surface_block_solve() {
+    // physics: DiffPD's x_C̄ = (A_C̄C̄)⁻¹(b − A x*)_C̄, r = (A x − b)_C, against y = A⁻¹b,
+    // λ = (A⁻¹_CC)⁻¹(x* − y)_C, x = y + A⁻¹I_C λ with A⁻¹_CC from the stored columns.
+    let body = body(SystemMatrix::RestStiffness, Frames::Floating, false);
+    let A = dense(&body, SystemMatrix::RestStiffness);
+    let n = A.nrows();
+    let mut cache = FactorCache::default();
+    let key = FactorKey::new(&body, H);
+    let surface = &body.model.surface;
+    cache.prepare(&key, &body, H, 0..surface.nodes.len() as u32).unwrap();
+    let factor = cache.get(&key).unwrap();
+    let contact: Vec<usize> = (0..surface.nodes.len()).step_by(3).collect();
+    let dofs: Vec<usize> = contact.iter().flat_map(|&s| (0..3).map(move |c| 3 * surface.nodes[s] as usize + c)).collect();
+    let b = DVector::from_fn(n, |i, _| ((i * 37 % 101) as f64 - 50.0) * 10.0);
+    let goal = DVector::from_fn(dofs.len(), |i, _| ((i * 13 % 17) as f64 - 8.0) * 1e-3);
+    // The partition, densely.
+    let free: Vec<usize> = (0..n).filter(|i| !dofs.contains(i)).collect();
+    let mut x = DVector::zeros(n);
+    dofs.iter().zip(goal.iter()).for_each(|(&i, g)| x[i] = *g);
+    let rhs = DVector::from_fn(free.len(), |i, _| b[free[i]] - A.row(free[i]).dot(&x.transpose()));
+    let solved = A.select_rows(&free).select_columns(&free).cholesky().unwrap().solve(&rhs);
+    free.iter().zip(solved.iter()).for_each(|(&i, v)| x[i] = *v);
+    let force = (&A * &x - &b).select_rows(&dofs);
+    // The surface block.
+    let W = DMatrix::from_fn(dofs.len(), dofs.len(), |i, j| {
+        factor.columns.block(contact[i / 3], contact[j / 3])[(i % 3, j % 3)]
+    });
+    let mut scratch = super::factor::FactorScratch::default();
+    let mut solve = |v: &DVector<f64>| {
+        let mut v = v.clone();
+        factor.symbolic.solve(&factor.factor, v.as_mut_slice(), 1, &mut scratch);
+        v
+    };
+    let y = solve(&b);
+    let lambda = W.cholesky().unwrap().solve(&(goal - y.select_rows(&dofs)));
+    let mut push = DVector::zeros(n);
+    dofs.iter().zip(lambda.iter()).for_each(|(&i, l)| push[i] = *l);
+    let twin = y + solve(&push);
+    assert!((&twin - &x).amax() < 1e-10 * x.amax(), "{:e}", (&twin - &x).amax());
+    assert!((&lambda - &force).amax() < 1e-10 * force.amax(), "{:e}", (&lambda - &force).amax());
+}
+
+#[test]
+fn delassus_blocks_are_what_the_metric_does() {
+    for (system, frames, pinned) in [
+        (SystemMatrix::Laplacian, Frames::Floating, false),
+        (SystemMatrix::RestStiffness, Frames::Floating, false),
+        (SystemMatrix::RestStiffness, Frames::PerNode, false),
+        (SystemMatrix::RestStiffness, Frames::PerNode, true),
+    ] {
+        let (cache, mut problem) = prepared(system, frames, pinned);
+        let factor = cache.get(&problem.key).unwrap();
+        let model = problem.model.clone();
+        let nodes = &model.surface.nodes;
+        for &(i, j) in &[(0, 0), (1, 5), (7, 2), (12, 19)] {
+            let (a, b) = (nodes[i] as usize, nodes[j] as usize);
+            if problem.key.pins.contains(&(a as u32)) || problem.key.pins.contains(&(b as u32)) {
+                continue;
+            }
+            let block = problem.metric.compliance(&factor.columns.block(i, j), a, b);
+            for c in 0..3 {
+                let mut push = vec![Vec3::zeros(); model.rest.len()];
+                push[b] = Vec3::ith(c, 1.0);
+                let moved = problem.preconditioned(&push, factor)[a];
+                // Two solves of a matrix of condition 1e3.
+                assert!((moved - block.column(c)).norm() < 1e-12 * block.norm(), "{system:?} {frames:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn translation_is_exact_in_every_metric() {
+    for (system, frames) in [
+        (SystemMatrix::Laplacian, Frames::Floating),
+        (SystemMatrix::RestStiffness, Frames::Floating),
+        (SystemMatrix::RestStiffness, Frames::PerNode),
+    ] {
+        let (cache, mut problem) = prepared(system, frames, false);
+        let factor = cache.get(&problem.key).unwrap();
+        // Weights move every node by h² g.
+        let density = 1000.0;
+        let weight: Vec<Vec3> = problem.model.node_volumes.iter().map(|v| Vec3::y() * (v * density)).collect();
+        for moved in problem.preconditioned(&weight, factor) {
+            assert!((moved - Vec3::y() * (H * H)).norm() < 1e-12 * H * H, "{system:?} {frames:?}");
+        }
+    }
+}
+
+/// `W = B Bᵀ` of rank `rank` over `contacts` contacts, some of them copies of others.
+fn random_problem(contacts: usize, rank: usize, mu: f64, numbers: &[f64]) -> ConeProblem {
+    let m = 3 * contacts;
+    let at = |k: usize| numbers[k % numbers.len()] + 0.01 * (k % 7) as f64;
+    let B = DMatrix::from_fn(m, rank, |i, j| {
+        // The last contact repeats the first: a redundant row.
+        let row = if contacts > 1 && i / 3 == contacts - 1 { i % 3 } else { i };
+        at(row * 17 + j * 29)
+    });
+    let W = &B * B.transpose();
+    // Gaps that some force can close: g = −W λ* + (positive on the normals).
+    let wish = DVector::from_fn(m, |i, _| at(i * 5 + 3));
+    let mut g = -&W * wish;
+    (0..contacts).for_each(|i| g[3 * i] += 0.1 * at(i).abs());
+    let mut problem = ConeProblem::default();
+    problem.offsets = (0..=contacts).map(|i| 3 * i).collect();
+    problem.friction = vec![mu; contacts];
+    problem.W = W.as_slice().to_vec();
+    problem.g = g.as_slice().to_vec();
+    problem
+}
+
+fn objective(problem: &ConeProblem, lambda: &[f64]) -> f64 {
+    let mut Wl = Vec::new();
+    problem.multiply(lambda, &mut Wl);
+    (0..lambda.len()).map(|k| lambda[k] * (0.5 * Wl[k] + problem.g[k])).sum()
+}
+
+/// Accelerated projected gradients on `½λᵀWλ + gᵀλ` over the cones.
+fn brute_force(problem: &ConeProblem) -> Vec<f64> {
+    let m = problem.rows();
+    let step = 1.0 / (0..m).map(|k| problem.W[k * m + k]).sum::<f64>();
+    let (mut lambda, mut ahead, mut t) = (vec![0.0; m], vec![0.0; m], 1.0f64);
+    let mut Wl = Vec::new();
+    for _ in 0..60_000 {
+        problem.multiply(&ahead, &mut Wl);
+        let before = lambda.clone();
+        for i in 0..problem.contacts() {
+            let u = [0, 1, 2].map(|c| ahead[3 * i + c] - step * (Wl[3 * i + c] + problem.g[3 * i + c]));
+            lambda[3 * i..3 * i + 3].copy_from_slice(&cone::project(u, problem.friction[i]).force);
+        }
+        let next = 0.5 * (1.0 + (1.0 + 4.0 * t * t).sqrt());
+        (0..m).for_each(|k| ahead[k] = lambda[k] + (t - 1.0) / next * (lambda[k] - before[k]));
+        t = next;
+    }
+    lambda
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn cone_solve_finds_the_brute_force_optimum(
+        contacts in 1usize..5, rank in 3usize..12, mu in 0.1..1.0f64,
+        numbers in proptest::collection::vec(-1.0..1.0f64, 60),
+    ) {
+        let problem = random_problem(contacts, rank, mu, &numbers);
+        let mut lambda = vec![0.0; problem.rows()];
+        let mut solver = ConeSolver::default();
+        // Outer proximal iterations: at the fixed point the regularisation cancels.
+        for _ in 0..200 {
+            solver.solve(&problem, &mut lambda, ConeTolerance { relative: 1e-12, floor: 1e-9 });
+        }
+        for i in 0..contacts {
+            prop_assert!(lambda[3 * i + 1].hypot(lambda[3 * i + 2]) <= mu * lambda[3 * i] + 1e-9);
+        }
+        let (found, best) = (objective(&problem, &lambda), objective(&problem, &brute_force(&problem)));
+        // The brute force itself converges like 1/k²: 60 000 steps leave a few 1e-8 of W ~ 1.
+        prop_assert!(found <= best + 1e-6 * (1.0 + best.abs()), "{found} against {best}");
+    }
+}
+
+/// A bent body with contacts at its lowest nodes.
+fn touching() -> (FactorCache, Island) {
+    let (cache, problem) = prepared(SystemMatrix::RestStiffness, Frames::PerNode, false);
+    let mut island = Island::default();
+    let nodes: Vec<u32> = problem.model.surface.nodes.iter().copied().filter(|&n| problem.model.rest[n as usize].y < -0.19).collect();
+    for n in nodes {
+        let x = problem.x_start[n as usize];
+        let soft = Side::Soft { body: 0, nodes: [n, 0, 0], weights: [1.0, 0.0, 0.0] };
+        let key = ContactKey { obstacle: 0, part: 0, feature: n };
+        let mut row = Row::new([soft, Side::Partner { partner: PartnerId(0), point: x }], Vec3::y(), 0.0, key);
+        row.friction = 0.4;
+        island.contacts.rows.push(row);
+    }
+    island.bodies.push(problem);
+    (cache, island)
+}
+
+fn plate() -> Partner {
+    Partner::Rigid {
+        com: Vec3::new(0.1, -0.3, 0.05),
+        inv_mass: Vec3::repeat(1.0 / 30.0),
+        inv_inertia: Mat3::from_diagonal(&Vec3::new(1.0, 0.7, 1.3)),
+        linvel: Vec3::y() * 0.5,
+        angvel: Vec3::new(0.1, 0.2, -0.3),
+        free_linvel: Vec3::y() * 0.4,
+        free_angvel: Vec3::new(0.1, 0.2, -0.3),
+    }
+}
+
+#[test]
+fn impulses_on_the_two_sides_cancel() {
+    let partner = plate();
+    let (cache, mut island) = touching();
+    island.solve(&cache, &[partner], H, &LIMITS);
+    let mut reactions = [Reaction::default()];
+    island.contacts.add_reactions(&[partner], H, &mut reactions);
+    let body = &island.bodies[0];
+    let gained = (0..body.current.x.len()).map(|i| {
+        let mass = 1000.0 * body.model.node_volumes[i];
+        (body.current.x[i] - body.x_start[i] - body.v_start[i] * H) * (mass / H)
+    });
+    let mass = 1000.0 * body.model.volume;
+    let by_contact: Vec3 = gained.sum::<Vec3>() + Vec3::y() * (9.81 * H * mass);
+    assert!(by_contact.y > 1.0, "they touch: {by_contact}");
+    let sum = by_contact + reactions[0].impulse;
+    assert!(sum.norm() < 1e-12 * by_contact.norm(), "{:e} of {:e}", sum.norm(), by_contact.norm());
+}
+
+#[test]
+fn solved_contacts_obey_signorini_and_coulomb() {
+    let partner = plate();
+    let (cache, mut island) = touching();
+    island.bodies[0].settings = SolverSettings::iterations(100);
+    island.solve(&cache, &[partner], H, &LIMITS);
+    let contacts: &ContactSystem = &island.contacts;
+    let mut carrying = 0;
+    for (i, row) in contacts.rows.iter().enumerate() {
+        let l = &contacts.lambda[3 * i..3 * i + 3];
+        let gap = contacts.final_gap(i);
+        // Lengths are of 1e-3 m over a step; the regularisation (ε = 1e-4) and the lagging shift of
+        // slipping rows leave less than 1e-4 of that.
+        assert!(gap > -1e-7 && l[0] >= 0.0 && l[1].hypot(l[2]) <= row.friction * l[0] * (1.0 + 1e-9), "{gap:e} {l:?} after {} it.", island.report.iterations);
+        // What carries is closed, but for the part of its slip by which the shift lags.
+        let slack = 1e-7 + 0.05 * contacts.shift[i];
+        assert!(l[0] == 0.0 || gap < slack, "carries {} N at {gap:e} m, slack {slack:e}", l[0]);
+        carrying += usize::from(l[0] > 0.0);
+    }
+    assert!(carrying >= 3);
+}

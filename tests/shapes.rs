@@ -1,0 +1,87 @@
+//! Every shape that rapier can hold holds a soft cube, at rest, with its weight.
+mod common;
+use common::*;
+use foible3d::prelude::*;
+use rapier3d::prelude::*;
+
+/// Lets a soft cube settle on a fixed collider whose top is about y = 0; its height and the force on
+/// it in units of its weight.
+fn settle(collider: ColliderBuilder) -> (f64, f64, f64) {
+    let mut physics = PhysicsWorld::new();
+    let (_, collider) = physics.insert(RigidBodyBuilder::fixed(), collider.friction(1.0));
+    let mut world = DeformableWorld::new();
+    let body = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [3, 3, 3])
+        .translation(Vector::Y * 0.12)
+        .material(DeformableMaterial::new(1e5, 0.3).friction(1.0).mass_damping(4.0));
+    let body = world.insert(body).unwrap();
+    for _ in 0..180 {
+        world.step(&mut physics);
+    }
+    let b = &world.bodies[body];
+    let weight = b.mass() * G;
+    (b.center_of_mass()[1], f64::from(world.contact_force(body, collider).y) / weight, b.max_speed())
+}
+
+fn box_points(half: f32) -> Vec<Vector> {
+    let sign = |b: usize| if b == 0 { -half } else { half };
+    (0..8).map(|i| Vector::new(sign(i & 1), sign(i >> 1 & 1), sign(i >> 2 & 1))).collect()
+}
+
+fn box_mesh(half: f32) -> (Vec<Vector>, Vec<[u32; 3]>) {
+    Cuboid::new(Vector::splat(half)).to_trimesh()
+}
+
+#[test]
+fn flat_topped_shapes_carry_a_cube() {
+    let down = |b: ColliderBuilder| b.translation(Vector::Y * -0.5);
+    let (points, triangles) = box_mesh(0.5);
+    let heights = Array2::new(9, 9, vec![0.0; 81]);
+    let parts = vec![
+        (Pose::translation(-0.25, 0.0, 0.0), SharedShape::cuboid(0.25, 0.5, 0.5)),
+        (Pose::translation(0.25, 0.0, 0.0), SharedShape::cuboid(0.25, 0.5, 0.5)),
+    ];
+    let shapes = [
+        ("cuboid", down(ColliderBuilder::cuboid(0.5, 0.5, 0.5))),
+        ("round cuboid", down(ColliderBuilder::round_cuboid(0.4, 0.4, 0.4, 0.1))),
+        ("cylinder", down(ColliderBuilder::cylinder(0.5, 0.5))),
+        ("round cylinder", down(ColliderBuilder::round_cylinder(0.4, 0.5, 0.1))),
+        ("half-space", ColliderBuilder::new(SharedShape::halfspace(Vector::Y))),
+        ("convex hull", down(ColliderBuilder::convex_hull(&box_points(0.5)).unwrap())),
+        ("round convex hull", down(ColliderBuilder::round_convex_hull(&box_points(0.4), 0.1).unwrap())),
+        ("triangle mesh", down(ColliderBuilder::trimesh(points.clone(), triangles.clone()).unwrap())),
+        (
+            "oriented triangle mesh",
+            down(ColliderBuilder::trimesh_with_flags(points, triangles, TriMeshFlags::ORIENTED).unwrap()),
+        ),
+        ("heightfield", ColliderBuilder::heightfield(heights, Vector::new(2.0, 1.0, 2.0))),
+        ("compound", down(ColliderBuilder::compound(parts))),
+        ("cone upside down", down(ColliderBuilder::cone(0.5, 0.5)).rotation(Vector::X * std::f32::consts::PI)),
+    ];
+    for (name, shape) in shapes {
+        let (height, force, speed) = settle(shape);
+        println!("{name}: height {height:.6}, force {force:.8}, speed {speed:.1e}");
+        // ρ g H²/(6E)·(1 + …): the centre sinks by less than 2 % of 0.1 m under its own weight.
+        assert!((0.096..0.1001).contains(&height), "{name}: {height}");
+        // f32 geometry of GJK's shapes: they answer to 1e-6 m or so, not to 1e-8.
+        assert!((force - 1.0).abs() < 1e-3, "{name}: {force}");
+        assert!(speed < 1e-3, "{name}: {speed:e}");
+    }
+}
+
+#[test]
+fn round_topped_shapes_carry_a_cube() {
+    let down = |b: ColliderBuilder, y: f32| b.translation(Vector::Y * -y);
+    let shapes = [
+        ("ball", down(ColliderBuilder::ball(0.5), 0.5)),
+        ("capsule", down(ColliderBuilder::capsule_x(0.5, 0.3), 0.3)),
+        ("cylinder on its side", down(ColliderBuilder::cylinder(0.5, 0.4), 0.4).rotation(Vector::Z * std::f32::consts::FRAC_PI_2)),
+        ("small ball under one triangle", down(ColliderBuilder::ball(0.02), 0.02)),
+    ];
+    for (name, shape) in shapes {
+        let (height, force, _) = settle(shape);
+        println!("{name}: height {height:.5}, force {force:.5}");
+        // It balances for the three seconds, being set down dead centre. The weight rests on a small area: it sinks in by millimetres, not through.
+        assert!((0.08..0.1001).contains(&height), "{name}: {height}");
+        assert!((force - 1.0).abs() < 1e-2, "{name}: {force}");
+    }
+}
