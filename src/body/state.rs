@@ -20,8 +20,11 @@ pub(crate) struct ContactKey {
     pub obstacle: u64,
     /// Part of a composite obstacle.
     pub part: u32,
-    /// Surface feature of the body: nodes first, then edges, then triangles.
+    /// Surface feature of the body: nodes first, then edges, then triangles, then corners of the
+    /// obstacle.
     pub feature: u32,
+    /// Which of the contacts on one feature: closest points of curved surfaces have several.
+    pub slot: u32,
 }
 
 /// What one contact leaves to the next step.
@@ -32,6 +35,9 @@ pub(crate) struct ContactMemory {
     pub force: Vec3,
     /// De Saxcé shift μ‖slip‖ [m] over the step, per second of it [m/s].
     pub shift_rate: f64,
+    /// Where on the body: nodes and their weights.
+    pub nodes: [u32; 3],
+    pub weights: [f64; 3],
 }
 
 impl DeformableState {
@@ -44,5 +50,14 @@ impl DeformableState {
     pub(crate) fn contact(&self, key: &ContactKey) -> Option<&ContactMemory> {
         let place = self.contacts.binary_search_by(|c| c.key.cmp(key));
         place.ok().map(|i| &self.contacts[i])
+    }
+
+    /// The contacts of the last step with one obstacle.
+    pub(crate) fn contacts_with(&self, obstacle: u64, part: u32) -> &[ContactMemory] {
+        let before = |c: &ContactMemory| (c.key.obstacle, c.key.part) < (obstacle, part);
+        let start = self.contacts.partition_point(before);
+        let same = |c: &ContactMemory| (c.key.obstacle, c.key.part) == (obstacle, part);
+        let count = self.contacts[start..].partition_point(same);
+        &self.contacts[start..start + count]
     }
 }

@@ -5,7 +5,7 @@ use super::rim_rows::{corner_on_triangle, corners_in, rim_crossing};
 use super::row::{Row, Side};
 use super::surface_point::{Scales, SurfacePoint, surface_point};
 use super::triangle_rows::triangle_point;
-use crate::body::{ContactKey, DeformableModel};
+use crate::body::{ContactKey, ContactMemory, DeformableModel};
 use crate::math::{Vec3, from_real, to_real};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 
@@ -24,6 +24,8 @@ const STATIC_MARGIN: f64 = 0.05;
 const SHIFT: f64 = 0.1;
 /// Part of the body's size within which a projection's direction is not trusted.
 const BAND: f64 = 1.0e-4;
+/// Slot of the first closest point on a feature; those before are nodes, rims and corners.
+const FIRST_POINT: u32 = 1;
 
 /// Finds contacts; holds the memory it needs between calls.
 #[derive(Default)]
@@ -39,6 +41,8 @@ pub(crate) struct Detector {
     /// Corners of the obstacle, and which triangle each stands on.
     corners: Vec<(u32, Vec3)>,
     standing: Vec<(usize, SurfacePoint)>,
+    /// Closest points, kept from the last step and new: feature, slot, row.
+    points: Vec<(u32, u32, SurfacePoint)>,
 }
 
 /// One call's arguments, shared by its parts.
@@ -79,13 +83,15 @@ impl Detector {
         Aabb::from_points(points).loosened(reach as f32)
     }
 
-    /// Appends the contacts of a pair to `rows`. [`Detector::begin`] was called for the body.
+    /// Appends the contacts of a pair to `rows`; `memory` holds those of the last step that carried.
+    /// [`Detector::begin`] was called for the body.
     pub fn detect(
         &mut self,
         pair: &Pair,
         obstacle: &Obstacle,
         model: &DeformableModel,
         x: &[Vec3],
+        memory: &[ContactMemory],
         rows: &mut Vec<Row>,
     ) {
         let first = rows.len();
@@ -110,10 +116,10 @@ impl Detector {
         if !obstacle.is_half_space() {
             self.detect_rims(&scene, rows);
             self.detect_corners(&scene, rows);
+            self.keep_points(&scene, memory, rows);
             self.detect_triangles(&scene, rows);
         }
         rows[first..].sort_by_key(|r| r.key);
-        remove_repeated(rows, first);
     }
 
     fn detect_nodes(&mut self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
@@ -190,7 +196,29 @@ impl Detector {
         }
     }
 
-    fn detect_triangles(&self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
+    /// Closest points that carried in the last step are looked at again where they were. One closest
+    /// point per triangle is not enough where a surface wraps around another: pushed in at one
+    /// point, the next one is elsewhere, and without memory the two would take turns for ever.
+    fn keep_points(&mut self, scene: &Scene<'_>, memory: &[ContactMemory], rows: &mut Vec<Row>) {
+        let surface = &scene.model.surface;
+        self.points.clear();
+        for kept in memory.iter().filter(|m| m.key.slot >= FIRST_POINT) {
+            let s = kept.nodes.map(|n| surface.index_of_node[n as usize] as usize);
+            let [a, b, c] = s.map(|s| self.local[s]);
+            let p = a * kept.weights[0] + b * kept.weights[1] + c * kept.weights[2];
+            let outward = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
+            let reach = s.iter().fold(0.0, |a: f64, &s| a.max(self.reach[s])) + scene.motion;
+            let found = surface_point(scene.obstacle, &p, &outward, &scene.scales);
+            if let Some(found) = found.filter(|f| f.gap < reach && f.normal.dot(&outward) < 0.0) {
+                self.points.push((kept.key.feature, kept.key.slot, found));
+                let mut row = scene.row(kept.nodes, kept.weights, &found, kept.key.feature);
+                row.key.slot = kept.key.slot;
+                rows.push(row);
+            }
+        }
+    }
+
+    fn detect_triangles(&mut self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
         let surface = &scene.model.surface;
         for (t, triangle) in surface.triangles.iter().enumerate() {
             let s = triangle.map(|n| surface.index_of_node[n as usize] as usize);
@@ -203,13 +231,21 @@ impl Detector {
             let edges = surface.triangle_edges[t].map(|e| &self.edges[e as usize]);
             let standing = self.standing.iter().filter(|(on, _)| *on == t).map(|(_, row)| row);
             let known = s.iter().filter_map(|&s| self.nodes[s].as_ref());
-            let known = known.chain(edges.into_iter().flatten()).chain(standing);
+            let [e0, e1, e2] = surface.triangle_edges[t].map(|e| scene.edge_feature(e as usize));
+            let own = [e0, e1, e2, scene.triangle_feature(t)];
+            let points = self.points.iter().filter(|(feature, ..)| own.contains(feature)).map(|p| &p.2);
+            let known = known.chain(edges.into_iter().flatten()).chain(standing).chain(points);
             if let Some(hit) = triangle_point(scene.obstacle, &corners, known, reach, &scene.scales) {
                 let feature = match hit.weights.iter().position(|w| *w == 0.0) {
                     Some(opposite) => scene.edge_feature(surface.triangle_edges[t][opposite] as usize),
                     None => scene.triangle_feature(t),
                 };
-                rows.push(scene.row(*triangle, hit.weights, &hit.surface, feature));
+                let taken = |slot: u32| self.points.iter().any(|p| (p.0, p.1) == (feature, slot));
+                let slot = (FIRST_POINT..).find(|&slot| !taken(slot)).unwrap_or(FIRST_POINT);
+                self.points.push((feature, slot, hit.surface));
+                let mut row = scene.row(*triangle, hit.weights, &hit.surface, feature);
+                row.key.slot = slot;
+                rows.push(row);
             }
         }
     }
@@ -263,6 +299,7 @@ impl Scene<'_> {
             obstacle: obstacle.key,
             part: obstacle.part,
             feature,
+            slot: 0,
         };
         let normal = obstacle.start.rotation * found.normal;
         let mut row = Row::new([soft, partner], normal.normalize(), found.gap, key);
@@ -276,20 +313,4 @@ impl Scene<'_> {
 fn near(extent: &Aabb, p: &Vec3, reach: f64) -> bool {
     let (low, high) = (from_real(extent.mins), from_real(extent.maxs));
     (0..3).all(|k| p[k] >= low[k] - reach && p[k] <= high[k] + reach)
-}
-
-/// Of rows with equal keys (an edge seen from both of its triangles) the deepest stays.
-fn remove_repeated(rows: &mut Vec<Row>, first: usize) {
-    let mut kept = first;
-    for i in first..rows.len() {
-        if kept > first && rows[kept - 1].key == rows[i].key {
-            if rows[i].gap < rows[kept - 1].gap {
-                rows.swap(kept - 1, i);
-            }
-        } else {
-            rows.swap(kept, i);
-            kept += 1;
-        }
-    }
-    rows.truncate(kept);
 }

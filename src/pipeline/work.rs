@@ -1,6 +1,6 @@
 //! What the pipeline keeps per body from step to step: memory only, nothing that results depend on.
 
-use crate::body::{ContactKey, ContactMemory, DeformableBody, DeformableBodyHandle};
+use crate::body::{ContactMemory, DeformableBody, DeformableBodyHandle};
 use crate::contact::{Candidates, Detector, Pair, Row, Side};
 use crate::coupling::{RapierScene, RapierSets, combined};
 use crate::math::Vec3;
@@ -64,7 +64,8 @@ impl BodyWork {
                 restitution,
             };
             self.pairs += 1;
-            self.detector.detect(&pair, obstacle, model, x, &mut self.rows);
+            let memory = body.state.contacts_with(obstacle.key, obstacle.part);
+            self.detector.detect(&pair, obstacle, model, x, memory, &mut self.rows);
         }
         let pinned = |node: usize| problem.key.pins.binary_search(&(node as u32)).is_ok();
         self.rows.retain_mut(|row| {
@@ -112,12 +113,11 @@ impl IslandWork {
         memory.clear();
         let contacts = &self.island.contacts;
         for (i, row) in contacts.rows.iter().enumerate() {
-            let of_member = matches!(row.sides[0], Side::Soft { body, .. } if body == member);
+            let Side::Soft { body, nodes, weights } = row.sides[0] else { continue };
             let force = contacts.force(i);
-            if of_member && force != Vec3::zeros() {
+            if body == member && force != Vec3::zeros() {
                 let shift_rate = contacts.shift[i] / h;
-                let key: ContactKey = row.key;
-                memory.push(ContactMemory { key, force, shift_rate });
+                memory.push(ContactMemory { key: row.key, force, shift_rate, nodes, weights });
             }
         }
     }

@@ -226,7 +226,7 @@ fn touching() -> (FactorCache, Island) {
     for n in nodes {
         let x = problem.x_start[n as usize];
         let soft = Side::Soft { body: 0, nodes: [n, 0, 0], weights: [1.0, 0.0, 0.0] };
-        let key = ContactKey { obstacle: 0, part: 0, feature: n };
+        let key = ContactKey { obstacle: 0, part: 0, feature: n, slot: 0 };
         let mut row = Row::new([soft, Side::Partner { partner: PartnerId(0), point: x }], Vec3::y(), 0.0, key);
         row.friction = 0.4;
         island.contacts.rows.push(row);
