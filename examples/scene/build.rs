@@ -1,0 +1,196 @@
+//! A scene file turned into a rapier world and a deformable one.
+
+use super::file::{self, Body, Kind, Quantity, Scene, Shape};
+use foible3d::prelude::*;
+use rapier3d::prelude::*;
+use std::path::Path;
+
+/// A running scene, with the names its file gives to things.
+pub struct Stage {
+    pub physics: PhysicsWorld,
+    pub world: DeformableWorld,
+    pub rigid: Vec<(String, RigidBodyHandle, ColliderHandle)>,
+    pub deformable: Vec<(String, DeformableBodyHandle)>,
+    pub probes: Vec<(String, DeformableBodyHandle, usize)>,
+}
+
+pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
+    let mut physics = PhysicsWorld::new();
+    physics.gravity = scene.world.gravity.into();
+    physics.integration_parameters.dt = *scene.world.dt.as_ref();
+    if let Some(iterations) = scene.world.iterations {
+        physics.integration_parameters.num_solver_iterations = iterations.max(1);
+    }
+    let mut stage = Stage {
+        physics,
+        world: DeformableWorld::new(),
+        rigid: Vec::new(),
+        deformable: Vec::new(),
+        probes: Vec::new(),
+    };
+    for body in &scene.rigid {
+        let name = body.name.as_ref().clone();
+        let builder = match body.kind {
+            Kind::Fixed => RigidBodyBuilder::fixed(),
+            Kind::Dynamic => RigidBodyBuilder::dynamic(),
+            Kind::Kinematic => RigidBodyBuilder::kinematic_velocity_based(),
+        };
+        let builder = builder
+            .pose(pose(body.translation, body.rotation))
+            .linvel(body.linvel.into())
+            .angvel(body.angvel.into())
+            .can_sleep(body.can_sleep);
+        let mut collider = ColliderBuilder::new(shape(&body.shape)?)
+            .friction(body.friction)
+            .restitution(body.restitution);
+        if let Some(mass) = &body.mass {
+            collider = collider.mass(*mass.as_ref());
+        }
+        if let Some(density) = &body.density {
+            collider = collider.density(*density.as_ref());
+        }
+        let (body, collider) = stage.physics.insert(builder, collider);
+        stage.rigid.push((name, body, collider));
+    }
+    for body in &scene.deformable {
+        let name = body.name.as_ref().clone();
+        let handle = deformable(body, folder).and_then(|b| stage.world.insert(b).map_err(|e| e.to_string()));
+        stage.deformable.push((name.clone(), handle.map_err(|e| format!("deformable \"{name}\": {e}"))?));
+    }
+    for probe in &scene.probe {
+        let owner = stage.deformable.iter().find(|(name, _)| name == probe.of.as_ref());
+        let Some(&(_, handle)) = owner else { continue };
+        let near = Vector::from(probe.near);
+        let body = &stage.world.bodies[handle];
+        let distances = body.positions().map(|p| (p - near).length()).enumerate();
+        let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(v, _)| v);
+        stage.probes.push((probe.name.as_ref().clone(), handle, nearest));
+    }
+    Ok(stage)
+}
+
+fn pose(translation: [f32; 3], degrees: [f32; 3]) -> Pose {
+    let rotation = Rotation::from_scaled_axis(Vector::from(degrees.map(f32::to_radians)));
+    Pose::from_parts(translation.into(), rotation)
+}
+
+fn shape(shape: &Shape) -> Result<SharedShape, String> {
+    let positive = |numbers: &[f32]| match numbers.iter().all(|n| *n > 0.0) {
+        true => Ok(()),
+        false => Err(format!("lengths of a shape must be positive, not {numbers:?}")),
+    };
+    Ok(match *shape {
+        Shape::Ball { radius } => positive(&[radius]).map(|()| SharedShape::ball(radius))?,
+        Shape::Cuboid { half_extents: [x, y, z] } => positive(&[x, y, z]).map(|()| SharedShape::cuboid(x, y, z))?,
+        Shape::Capsule { half_height, radius } => {
+            positive(&[half_height, radius]).map(|()| SharedShape::capsule_y(half_height, radius))?
+        }
+        Shape::Cylinder { half_height, radius } => {
+            positive(&[half_height, radius]).map(|()| SharedShape::cylinder(half_height, radius))?
+        }
+        Shape::Cone { half_height, radius } => {
+            positive(&[half_height, radius]).map(|()| SharedShape::cone(half_height, radius))?
+        }
+        Shape::HalfSpace { normal } => {
+            let normal = Vector::from(normal).try_normalize();
+            SharedShape::halfspace(normal.ok_or("the normal of a half-space must not be zero")?)
+        }
+    })
+}
+
+fn deformable(body: &file::Deformable, folder: &Path) -> Result<DeformableBodyBuilder, String> {
+    let builder = match body.body.as_ref() {
+        Body::Lattice { half_extents, cells } => DeformableBodyBuilder::cuboid((*half_extents).into(), *cells),
+        Body::Filled { shape: filled, cell_size } => DeformableBodyBuilder::filled(&*shape(filled)?, *cell_size),
+        Body::Mesh { path } => DeformableBodyBuilder::gmsh(folder.join(path)),
+    };
+    let m = body.material.as_ref();
+    let material = DeformableMaterial::new(m.youngs_modulus, m.poisson_ratio)
+        .density(m.density)
+        .friction(m.friction)
+        .restitution(m.restitution)
+        .mass_damping(m.mass_damping)
+        .stiffness_damping(m.stiffness_damping)
+        .elasticity(match m.elasticity {
+            file::Elasticity::LinearCorotated => Elasticity::LinearCorotated,
+            file::Elasticity::Projective => Elasticity::Projective,
+        });
+    let defaults = SolverSettings::default();
+    let settings = SolverSettings {
+        system: match body.solver.system {
+            Some(file::System::Laplacian) => SystemMatrix::Laplacian,
+            Some(file::System::RestStiffness) | None => SystemMatrix::RestStiffness,
+        },
+        frames: match body.solver.frames {
+            Some(file::Frames::Floating) => Frames::Floating,
+            Some(file::Frames::PerNode) => Frames::PerNode,
+            Some(file::Frames::Automatic) | None => Frames::Automatic,
+        },
+        max_iterations: body.solver.max_iterations.unwrap_or(defaults.max_iterations),
+        tolerance: body.solver.tolerance.unwrap_or(defaults.tolerance),
+        acceleration: match body.solver.lbfgs {
+            Some(0) => Acceleration::None,
+            Some(window) => Acceleration::Lbfgs { window },
+            None => defaults.acceleration,
+        },
+    };
+    let builder = builder
+        .pose(pose(body.translation, body.rotation))
+        .linvel(body.linvel.into())
+        .angvel(body.angvel.into())
+        .material(material)
+        .settings(settings);
+    Ok(match body.pinned {
+        Some(region) => {
+            let (low, high) = (Vector::from(region.min), Vector::from(region.max));
+            builder.pinned(move |x| x.cmpge(low).all() && x.cmple(high).all())
+        }
+        None => builder,
+    })
+}
+
+impl Stage {
+    /// The present value of a quantity of a named thing; names were checked with the file.
+    pub fn measure(&self, quantity: Quantity, of: &str, on: Option<&str>) -> f64 {
+        if let Some((_, handle)) = self.deformable.iter().find(|(name, _)| name == of) {
+            return self.measure_deformable(quantity, *handle, on);
+        }
+        let (position, speed) = if let Some((_, body, vertex)) = self.probes.iter().find(|(name, ..)| name == of) {
+            let body = &self.world.bodies[*body];
+            let speed = body.velocity(*vertex).map_or(f64::NAN, |[x, y, z]| x.hypot(y).hypot(z));
+            (body.position(*vertex).unwrap_or([f64::NAN; 3]), speed)
+        } else if let Some((_, handle, _)) = self.rigid.iter().find(|(name, ..)| name == of) {
+            let body = &self.physics.bodies[*handle];
+            (body.translation().to_array().map(f64::from), f64::from(body.linvel().length()))
+        } else {
+            return f64::NAN;
+        };
+        match quantity {
+            Quantity::X => position[0],
+            Quantity::Y => position[1],
+            Quantity::Z => position[2],
+            Quantity::Speed => speed,
+            Quantity::Force => self.deformable.iter().map(|(_, d)| self.force(*d, of)).sum(),
+            Quantity::VolumeRatio | Quantity::Penetration => f64::NAN,
+        }
+    }
+
+    fn measure_deformable(&self, quantity: Quantity, handle: DeformableBodyHandle, on: Option<&str>) -> f64 {
+        let body = &self.world.bodies[handle];
+        match quantity {
+            Quantity::X => body.center_of_mass()[0],
+            Quantity::Y => body.center_of_mass()[1],
+            Quantity::Z => body.center_of_mass()[2],
+            Quantity::Speed => body.max_speed(),
+            Quantity::VolumeRatio => body.volume() / body.model().volume(),
+            Quantity::Force => on.map_or(0.0, |on| self.force(handle, on)),
+            Quantity::Penetration => self.world.contacts_of(handle).map(|c| -c.gap).fold(0.0, f64::max),
+        }
+    }
+
+    /// Vertical force of a named rigid body on a deformable one [N].
+    pub fn force(&self, body: DeformableBodyHandle, on: &str) -> f64 {
+        let rigid = self.rigid.iter().find(|(name, ..)| name == on);
+        rigid.map_or(0.0, |(_, _, collider)| f64::from(self.world.contact_force(body, *collider).y))
+    }
+}

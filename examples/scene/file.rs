@@ -1,0 +1,329 @@
+//! The scene file: what it may hold, and what is said of one that holds something else.
+
+use serde::Deserialize;
+use std::fmt::Write as _;
+use std::ops::Range;
+use toml::Spanned;
+
+type Vec3 = [f32; 3];
+
+/// A whole scene.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    pub world: World,
+    #[serde(default)]
+    pub rigid: Vec<Rigid>,
+    #[serde(default)]
+    pub deformable: Vec<Deformable>,
+    #[serde(default)]
+    pub probe: Vec<Probe>,
+    #[serde(default)]
+    pub expect: Vec<Expect>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct World {
+    #[serde(default = "gravity")]
+    pub gravity: Vec3,
+    #[serde(default = "dt")]
+    pub dt: Spanned<f32>,
+    pub duration: Spanned<f32>,
+    /// Rapier's solver iterations.
+    pub iterations: Option<usize>,
+}
+
+fn gravity() -> Vec3 {
+    [0.0, -9.81, 0.0]
+}
+
+fn dt() -> Spanned<f32> {
+    Spanned::new(0..0, 1.0 / 60.0)
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rigid {
+    pub name: Spanned<String>,
+    pub kind: Kind,
+    pub shape: Shape,
+    pub mass: Option<Spanned<f32>>,
+    pub density: Option<Spanned<f32>>,
+    #[serde(default)]
+    pub translation: Vec3,
+    /// Axis times angle [degrees].
+    #[serde(default)]
+    pub rotation: Vec3,
+    #[serde(default)]
+    pub linvel: Vec3,
+    #[serde(default)]
+    pub angvel: Vec3,
+    #[serde(default = "friction")]
+    pub friction: f32,
+    #[serde(default)]
+    pub restitution: f32,
+    #[serde(default)]
+    pub can_sleep: bool,
+}
+
+fn friction() -> f32 {
+    0.5
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    Fixed,
+    Dynamic,
+    Kinematic,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Shape {
+    Ball { radius: f32 },
+    Cuboid { half_extents: Vec3 },
+    Capsule { half_height: f32, radius: f32 },
+    Cylinder { half_height: f32, radius: f32 },
+    Cone { half_height: f32, radius: f32 },
+    HalfSpace { normal: Vec3 },
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Deformable {
+    pub name: Spanned<String>,
+    pub body: Spanned<Body>,
+    pub material: Spanned<Material>,
+    #[serde(default)]
+    pub translation: Vec3,
+    /// Axis times angle [degrees].
+    #[serde(default)]
+    pub rotation: Vec3,
+    #[serde(default)]
+    pub linvel: Vec3,
+    #[serde(default)]
+    pub angvel: Vec3,
+    /// Vertices in this box of the world are pinned.
+    pub pinned: Option<Region>,
+    #[serde(default)]
+    pub solver: Solver,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Body {
+    Lattice { half_extents: Vec3, cells: [usize; 3] },
+    Filled { shape: Shape, cell_size: f32 },
+    /// A Gmsh file, relative to the scene file.
+    Mesh { path: String },
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    pub youngs_modulus: f64,
+    pub poisson_ratio: f64,
+    #[serde(default = "density")]
+    pub density: f64,
+    #[serde(default = "soft_friction")]
+    pub friction: f64,
+    #[serde(default)]
+    pub restitution: f64,
+    #[serde(default)]
+    pub mass_damping: f64,
+    #[serde(default)]
+    pub stiffness_damping: f64,
+    #[serde(default)]
+    pub elasticity: Elasticity,
+}
+
+fn density() -> f64 {
+    1000.0
+}
+
+fn soft_friction() -> f64 {
+    0.5
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Elasticity {
+    #[default]
+    LinearCorotated,
+    Projective,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Region {
+    pub min: Vec3,
+    pub max: Vec3,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Solver {
+    pub system: Option<System>,
+    pub frames: Option<Frames>,
+    pub max_iterations: Option<usize>,
+    pub tolerance: Option<f64>,
+    /// Pairs of L-BFGS; 0 for none.
+    pub lbfgs: Option<usize>,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum System {
+    RestStiffness,
+    Laplacian,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Frames {
+    Automatic,
+    Floating,
+    PerNode,
+}
+
+/// The vertex of a body that is nearest to a point at the start.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Probe {
+    pub name: Spanned<String>,
+    pub of: Spanned<String>,
+    pub near: Vec3,
+}
+
+/// A number that the scene must come to.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Expect {
+    pub quantity: Spanned<Quantity>,
+    /// Body or probe.
+    pub of: Spanned<String>,
+    /// The rigid body that touches it, for `force`.
+    pub on: Option<Spanned<String>>,
+    /// Time [s]; the end if not given.
+    pub at: Option<Spanned<f32>>,
+    pub equals: Option<f64>,
+    pub at_most: Option<f64>,
+    pub at_least: Option<f64>,
+    /// Tolerance of `equals`.
+    pub within: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// Position of the centre of mass, or of a probe [m].
+    X,
+    Y,
+    Z,
+    /// Speed of the fastest vertex, or of a rigid body or probe [m/s].
+    Speed,
+    /// Volume over volume at rest.
+    VolumeRatio,
+    /// Vertical contact force between the body and `on` [N].
+    Force,
+    /// Deepest penetration of the body's contacts [m].
+    Penetration,
+}
+
+/// Reads and checks a scene; the error says the line, the key and what would be right.
+pub fn parse(text: &str) -> Result<Scene, String> {
+    let scene: Scene = toml::from_str(text).map_err(|error| syntax_error(text, &error))?;
+    check(&scene).map_err(|(span, what)| at_line(text, span.start, &what))?;
+    Ok(scene)
+}
+
+fn syntax_error(text: &str, error: &toml::de::Error) -> String {
+    at_line(text, error.span().map_or(0, |s| s.start), error.message())
+}
+
+fn at_line(text: &str, offset: usize, what: &str) -> String {
+    let line = text[..offset.min(text.len())].matches('\n').count();
+    let quoted = text.lines().nth(line).unwrap_or_default().trim();
+    let mut message = String::new();
+    let _ = write!(message, "line {}: {what}\n    {quoted}", line + 1);
+    message
+}
+
+type Mistake = (Range<usize>, String);
+
+fn check(scene: &Scene) -> Result<(), Mistake> {
+    let positive = |value: &Spanned<f32>, key: &str| match *value.as_ref() > 0.0 && value.as_ref().is_finite() {
+        true => Ok(()),
+        false => Err((value.span(), format!("`{key}` is {}, but must be positive", value.as_ref()))),
+    };
+    positive(&scene.world.dt, "dt")?;
+    positive(&scene.world.duration, "duration")?;
+    let mut names: Vec<&Spanned<String>> = Vec::new();
+    let rigid = scene.rigid.iter().map(|r| &r.name);
+    for name in rigid.chain(scene.deformable.iter().map(|d| &d.name)).chain(scene.probe.iter().map(|p| &p.name)) {
+        if names.iter().any(|n| n.as_ref() == name.as_ref()) {
+            return Err((name.span(), format!("`name` \"{}\" is taken; every name must be unique", name.as_ref())));
+        }
+        names.push(name);
+    }
+    for body in &scene.rigid {
+        if let (Some(mass), Some(_)) = (&body.mass, &body.density) {
+            return Err((mass.span(), "give `mass` or `density`, not both".into()));
+        }
+        body.mass.as_ref().map_or(Ok(()), |m| positive(m, "mass"))?;
+        body.density.as_ref().map_or(Ok(()), |d| positive(d, "density"))?;
+    }
+    let deformable = |name: &str| scene.deformable.iter().any(|d| d.name.as_ref() == name);
+    let rigid = |name: &str| scene.rigid.iter().any(|r| r.name.as_ref() == name);
+    let probe = |name: &str| scene.probe.iter().any(|p| p.name.as_ref() == name);
+    for p in &scene.probe {
+        if !deformable(p.of.as_ref()) {
+            return Err(unknown(&p.of, "of", "a deformable", &scene.deformable.iter().map(|d| d.name.as_ref().as_str()).collect::<Vec<_>>()));
+        }
+    }
+    let all: Vec<&str> = names.iter().map(|n| n.as_ref().as_str()).collect();
+    for e in &scene.expect {
+        let of = e.of.as_ref();
+        if !all.contains(&of.as_str()) {
+            return Err(unknown(&e.of, "of", "a body or probe", &all));
+        }
+        let of_deformable_only = matches!(e.quantity.as_ref(), Quantity::VolumeRatio | Quantity::Penetration);
+        if of_deformable_only && !deformable(of) {
+            return Err((e.of.span(), format!("`of` must name a deformable for this quantity, and \"{of}\" is none")));
+        }
+        if probe(of) && *e.quantity.as_ref() == Quantity::Force {
+            return Err((e.of.span(), "a probe has no `force`; name its body".into()));
+        }
+        match (&e.on, *e.quantity.as_ref() == Quantity::Force) {
+            (Some(on), true) if !rigid(on.as_ref()) => {
+                return Err(unknown(on, "on", "a rigid body", &scene.rigid.iter().map(|r| r.name.as_ref().as_str()).collect::<Vec<_>>()));
+            }
+            (None, true) => return Err((e.quantity.span(), "`force` needs `on`, the rigid body that touches".into())),
+            (Some(on), false) => return Err((on.span(), "`on` is for the quantity `force` only".into())),
+            _ => {}
+        }
+        if let Some(at) = &e.at {
+            let end = *scene.world.duration.as_ref();
+            if !(0.0..=end).contains(at.as_ref()) {
+                return Err((at.span(), format!("`at` is {} s, but the scene lasts from 0 to {end} s", at.as_ref())));
+            }
+        }
+        match (e.equals, e.at_most, e.at_least) {
+            (None, None, None) => {
+                return Err((e.quantity.span(), "an expectation needs `equals`, `at_most` or `at_least`".into()));
+            }
+            (Some(_), ..) if e.within.is_none() => {
+                return Err((e.quantity.span(), "`equals` needs `within`, its tolerance".into()));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn unknown(name: &Spanned<String>, key: &str, what: &str, right: &[&str]) -> Mistake {
+    let message = format!("`{key}` names \"{}\", which is not {what}; there are: {}", name.as_ref(), right.join(", "));
+    (name.span(), message)
+}
