@@ -1,0 +1,80 @@
+//! Wrong scene files and what each is answered: the line, the key, what would be right.
+
+#[allow(dead_code)]
+#[path = "../examples/scene/file.rs"]
+mod file;
+
+const GOOD: &str = r#"[world]
+duration = 1.0
+
+[[rigid]]
+name = "floor"
+kind = "fixed"
+shape = { cuboid = { half_extents = [1.0, 0.5, 1.0] } }
+
+[[deformable]]
+name = "cube"
+body = { lattice = { half_extents = [0.2, 0.2, 0.2], cells = [2, 2, 2] } }
+material = { youngs_modulus = 1.0e6, poisson_ratio = 0.3 }
+
+[[probe]]
+name = "top"
+of = "cube"
+near = [0.0, 0.2, 0.0]
+
+[[expect]]
+quantity = "force"
+of = "cube"
+on = "floor"
+equals = 10.0
+within = 0.1
+"#;
+
+#[test]
+fn the_good_file_is_taken() {
+    file::parse(GOOD).unwrap();
+}
+
+#[test]
+fn shipped_scenes_parse() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/scenes");
+    let scenes = std::fs::read_dir(folder).unwrap().filter_map(|e| Some(e.ok()?.path()));
+    let scenes: Vec<_> = scenes.filter(|p| p.extension().is_some_and(|e| e == "toml")).collect();
+    assert!(scenes.len() >= 5);
+    for path in scenes {
+        let parsed = file::parse(&std::fs::read_to_string(&path).unwrap());
+        assert!(parsed.is_ok(), "{}: {}", path.display(), parsed.unwrap_err());
+    }
+}
+
+#[test]
+fn wrong_files_are_answered_with_line_key_and_what_would_be_right() {
+    // What is replaced by what; the line; what the answer has to say.
+    let table: [(&str, &str, usize, &[&str]); 16] = [
+        ("duration = 1.0", "duration = -1.0", 2, &["duration", "positive"]),
+        ("duration = 1.0", "durations = 1.0", 2, &["durations", "duration"]),
+        ("duration = 1.0", "duration = \"long\"", 2, &["string", "f32"]),
+        ("duration = 1.0", "duration = 1.0\ndt = 0.0", 3, &["dt", "positive"]),
+        ("kind = \"fixed\"", "kind = \"static\"", 6, &["static", "fixed", "dynamic", "kinematic"]),
+        ("cuboid = { half", "cubold = { half", 7, &["cubold", "cuboid"]),
+        ("half_extents = [1.0, 0.5, 1.0]", "half_extents = [1.0, 0.5]", 7, &["length"]),
+        ("poisson_ratio = 0.3", "poisson = 0.3", 12, &["poisson", "poisson_ratio"]),
+        ("youngs_modulus = 1.0e6, ", "", 12, &["missing", "youngs_modulus"]),
+        ("name = \"cube\"", "name = \"floor\"", 10, &["floor", "unique"]),
+        ("of = \"cube\"\nnear", "of = \"sphere\"\nnear", 16, &["sphere", "of", "cube"]),
+        ("on = \"floor\"", "on = \"ceiling\"", 22, &["ceiling", "on", "floor"]),
+        ("on = \"floor\"\n", "", 20, &["force", "on"]),
+        ("quantity = \"force\"", "quantity = \"weight\"", 20, &["weight", "force", "volume_ratio"]),
+        ("within = 0.1\n", "", 20, &["equals", "within"]),
+        ("equals = 10.0", "equals = 10.0\nat = 7.0", 24, &["at", "7", "1"]),
+    ];
+    for (right, wrong, line, says) in table {
+        assert!(GOOD.contains(right), "{right}");
+        let answer = file::parse(&GOOD.replacen(right, wrong, 1)).unwrap_err();
+        println!("{wrong:?} → {answer}\n");
+        assert!(answer.starts_with(&format!("line {line}:")), "{wrong:?}: {answer}");
+        for word in says {
+            assert!(answer.contains(word), "{wrong:?} should say {word:?}: {answer}");
+        }
+    }
+}
