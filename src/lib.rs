@@ -45,24 +45,23 @@ mod coupling;
 mod pipeline;
 
 pub use body::{
-    Acceleration, BodyError, DeformableBody, DeformableBodyBuilder, DeformableBodyHandle,
-    DeformableBodySet, DeformableModel, DeformableState, Frames, Pin, SolverSettings, SystemMatrix,
+    Acceleration, BodyError, DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet,
+    DeformableModel, DeformableState, Frames, Pin, SolverSettings, SystemMatrix,
 };
 pub use energy::Elasticity;
 pub use error::{DeformableBodyError, HandleError};
 pub use material::{DeformableMaterial, MaterialError};
 pub use mesh::{MeshError, TetMesh};
 pub use pipeline::{
-    DeformableContact, DeformableCounters, DeformableParameters, DeformablePipeline,
-    DeformableWorld,
+    DeformableContact, DeformableCounters, DeformableParameters, DeformablePipeline, DeformableWorld,
 };
 
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
 pub mod prelude {
     pub use crate::{
-        Acceleration, DeformableBody, DeformableBodyBuilder, DeformableBodyError,
-        DeformableBodyHandle, DeformableBodySet, DeformableContact, DeformableCounters,
-        DeformableMaterial, DeformableModel, DeformableParameters, DeformablePipeline,
-        DeformableWorld, Elasticity, Frames, SolverSettings, SystemMatrix, TetMesh,
+        Acceleration, DeformableBody, DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle,
+        DeformableBodySet, DeformableContact, DeformableCounters, DeformableMaterial, DeformableModel,
+        DeformableParameters, DeformablePipeline, DeformableWorld, Elasticity, Frames, SolverSettings,
+        SystemMatrix, TetMesh,
     };
 }

@@ -113,18 +113,11 @@ impl DeformableMaterial {
     pub fn validate(&self) -> Result<(), MaterialError> {
         let check = |quantity, value: f64, range, fine: bool| match fine {
             true => Ok(()),
-            false => Err(MaterialError {
-                quantity,
-                value,
-                range,
-            }),
+            false => Err(MaterialError { quantity, value, range }),
         };
-        let positive = |quantity, v: f64| {
-            check(quantity, v, "positive and finite", v.is_finite() && v > 0.0)
-        };
-        let not_negative = |quantity, v: f64| {
-            check(quantity, v, "zero or positive, and finite", v.is_finite() && v >= 0.0)
-        };
+        let positive = |quantity, v: f64| check(quantity, v, "positive and finite", v.is_finite() && v > 0.0);
+        let not_negative =
+            |quantity, v: f64| check(quantity, v, "zero or positive, and finite", v.is_finite() && v >= 0.0);
         positive("Young's modulus", self.youngs_modulus)?;
         let nu = self.poisson_ratio;
         check("Poisson's ratio", nu, "in [0, 0.4999]", (0.0..=0.4999).contains(&nu))?;
@@ -139,10 +132,7 @@ impl DeformableMaterial {
     /// μ = E/(2(1+ν)), λ = Eν/((1+ν)(1−2ν)).
     pub(crate) fn lame(&self) -> Lame {
         let (e, nu) = (self.youngs_modulus, self.poisson_ratio);
-        Lame {
-            mu: e / (2.0 * (1.0 + nu)),
-            lambda: e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)),
-        }
+        Lame { mu: e / (2.0 * (1.0 + nu)), lambda: e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)) }
     }
 }
 

@@ -89,7 +89,9 @@ fn bars_bent_and_twisted_by_180_degrees_never_gain_energy() {
             let settings = SolverSettings::iterations(iterations);
             let bent = let_go(bent_by_180_degrees, e, settings);
             let twisted = let_go(twisted_by_180_degrees, e, settings);
-            println!("E {e:e}, {iterations} it.: highest energy {bent:.4} (bent) {twisted:.4} (twisted) of the start");
+            println!(
+                "E {e:e}, {iterations} it.: highest energy {bent:.4} (bent) {twisted:.4} (twisted) of the start"
+            );
             // Implicit Euler is dissipative but for the energy's nonconvexity: 2e-3, as at impacts.
             assert!(bent < 1.002 && twisted < 1.002, "E {e:e}, {iterations} it.: {bent} {twisted}");
         }

@@ -17,7 +17,8 @@ fn momentum_is_conserved_between_a_free_soft_and_a_free_rigid_body() {
     let mut world = DeformableWorld::new();
     let soft = world.insert(small_cube(Vector::new(-0.3, 0.02, 0.01)).linvel(Vector::X * 2.0)).unwrap();
     let rigid = RigidBodyBuilder::dynamic().translation(Vector::X * 0.1).can_sleep(false);
-    let (rigid, _) = physics.insert(rigid, ColliderBuilder::cuboid(0.1, 0.1, 0.1).density(1000.0).friction(0.5));
+    let (rigid, _) =
+        physics.insert(rigid, ColliderBuilder::cuboid(0.1, 0.1, 0.1).density(1000.0).friction(0.5));
     let total = |world: &DeformableWorld, physics: &PhysicsWorld| {
         let (p, body) = (world.bodies[soft].linear_momentum(), &physics.bodies[rigid]);
         let q = body.linvel() * body.mass();
@@ -46,7 +47,8 @@ fn angular_momentum_passes_to_the_rigid_body_as_a_couple_would() {
     let mut world = DeformableWorld::new();
     world.insert(small_cube(Vector::new(-0.3, 0.15, 0.0)).linvel(Vector::X * 2.0)).unwrap();
     let body = RigidBodyBuilder::dynamic().translation(Vector::X * 0.1).can_sleep(false);
-    let (rigid, collider) = physics.insert(body, ColliderBuilder::cuboid(0.1, 0.2, 0.1).density(1000.0).friction(0.0));
+    let (rigid, collider) =
+        physics.insert(body, ColliderBuilder::cuboid(0.1, 0.2, 0.1).density(1000.0).friction(0.0));
     let mut torque_impulse = 0.0;
     for _ in 0..60 {
         let com = physics.bodies[rigid].center_of_mass();
@@ -56,7 +58,10 @@ fn angular_momentum_passes_to_the_rigid_body_as_a_couple_would() {
     }
     let inertia = 16.0 * (0.2f32.powi(2) + 0.4f32.powi(2)) / 12.0;
     let spin = physics.bodies[rigid].angvel().z * inertia;
-    assert!(torque_impulse < -0.5 && (spin / torque_impulse - 1.0).abs() < 1e-3, "{spin} of {torque_impulse}");
+    assert!(
+        torque_impulse < -0.5 && (spin / torque_impulse - 1.0).abs() < 1e-3,
+        "{spin} of {torque_impulse}"
+    );
 }
 
 #[test]
@@ -97,8 +102,10 @@ fn user_force_on_a_carried_box_reaches_the_floor() {
 fn kinematic_press_compresses_by_what_it_moves() {
     let (mut physics, floor) = world_with_floor(1.0 / 60.0);
     let mut world = DeformableWorld::new();
-    let body = world.insert(cube(DeformableMaterial::new(1e6, 0.0).friction(0.0).mass_damping(5.0), 0.2)).unwrap();
-    let press = RigidBodyBuilder::kinematic_velocity_based().translation(Vector::Y * 0.5).linvel(Vector::Y * -0.02);
+    let body =
+        world.insert(cube(DeformableMaterial::new(1e6, 0.0).friction(0.0).mass_damping(5.0), 0.2)).unwrap();
+    let press =
+        RigidBodyBuilder::kinematic_velocity_based().translation(Vector::Y * 0.5).linvel(Vector::Y * -0.02);
     let (press, plate) = physics.insert(press, ColliderBuilder::cuboid(0.5, 0.1, 0.5).friction(0.0));
     for _ in 0..60 {
         world.step(&mut physics);
@@ -182,7 +189,13 @@ fn own_loops_get_the_same_bits_as_the_world() {
         world.step(&mut physics);
         let dt = own.integration_parameters.dt;
         other.pipeline.before_step(
-            &other.parameters, own.gravity, dt, &mut other.bodies, &mut own.bodies, &own.colliders, &own.multibody_joints,
+            &other.parameters,
+            own.gravity,
+            dt,
+            &mut other.bodies,
+            &mut own.bodies,
+            &own.colliders,
+            &own.multibody_joints,
         );
         own.step();
         other.pipeline.after_step(&mut own.bodies);

@@ -101,7 +101,8 @@ fn box_on_a_slope_tips_when_tan_theta_exceeds_width_over_height() {
         for _ in 0..120 {
             world.step(&mut physics);
         }
-        (0..2).map(|k| (world.bodies[body].center_of_mass()[k] - before[k]).powi(2)).sum::<f64>().sqrt() > 0.05
+        (0..2).map(|k| (world.bodies[body].center_of_mass()[k] - before[k]).powi(2)).sum::<f64>().sqrt()
+            > 0.05
     };
     assert!(!tips(0.48));
     assert!(tips(0.52));

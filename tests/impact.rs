@@ -12,7 +12,8 @@ fn drop_box(restitution: f32) -> (f64, f64, f64) {
     let material = DeformableMaterial::new(1e9, 0.3).restitution(f64::from(restitution));
     let body = cube(material, 0.2).restitution_combine_rule(CoefficientCombineRule::Min);
     world.insert(body).unwrap();
-    let shape = ColliderBuilder::cuboid(0.2, 0.2, 0.2).restitution(restitution).density(1000.0).friction(MU as f32);
+    let shape =
+        ColliderBuilder::cuboid(0.2, 0.2, 0.2).restitution(restitution).density(1000.0).friction(MU as f32);
     let falling = RigidBodyBuilder::dynamic().translation(Vector::Y * 1.1).can_sleep(false);
     let (falling, _) = physics.insert(falling, shape);
     let (mut impact, mut rebound) = (0.0f64, 0.0f64);

@@ -30,7 +30,9 @@ fn spinning_body_keeps_its_shape_and_its_centre() {
     let mut physics = PhysicsWorld::new();
     physics.gravity = Vector::ZERO;
     let mut world = DeformableWorld::new();
-    let body = world.insert(cube(DeformableMaterial::new(1e8, 0.3), 0.0).angvel(Vector::new(0.0, 5.0, 0.0))).unwrap();
+    let body = world
+        .insert(cube(DeformableMaterial::new(1e8, 0.3), 0.0).angvel(Vector::new(0.0, 5.0, 0.0)))
+        .unwrap();
     let (centre, momentum) = (world.bodies[body].center_of_mass(), world.bodies[body].angular_momentum()[1]);
     for _ in 0..60 {
         world.step(&mut physics);
@@ -50,8 +52,13 @@ fn inverted_cube_recovers() {
         let mut physics = PhysicsWorld::new();
         physics.gravity = Vector::ZERO;
         let mut world = DeformableWorld::new();
-        let material = DeformableMaterial::new(1e5, 0.3).elasticity(elasticity).mass_damping(2.0).stiffness_damping(0.005);
-        let body = world.insert(DeformableBodyBuilder::cuboid(Vector::splat(0.2), [3, 3, 3]).material(material)).unwrap();
+        let material = DeformableMaterial::new(1e5, 0.3)
+            .elasticity(elasticity)
+            .mass_damping(2.0)
+            .stiffness_damping(0.005);
+        let body = world
+            .insert(DeformableBodyBuilder::cuboid(Vector::splat(0.2), [3, 3, 3]).material(material))
+            .unwrap();
         let b = &mut world.bodies[body];
         for v in 0..b.vertex_count() {
             // Turned inside out along x, and squeezed.
@@ -107,7 +114,13 @@ fn steps_of_unusable_length_are_skipped() {
     for dt in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         let sets = (&mut world.bodies, &mut physics.bodies);
         world.pipeline.before_step(
-            &world.parameters, physics.gravity, dt, sets.0, sets.1, &physics.colliders, &physics.multibody_joints,
+            &world.parameters,
+            physics.gravity,
+            dt,
+            sets.0,
+            sets.1,
+            &physics.colliders,
+            &physics.multibody_joints,
         );
         assert!(world.pipeline.counters().skipped);
         assert!(world.pipeline.prepare(&world.bodies, dt).is_err());
@@ -143,7 +156,8 @@ fn runtime_changes_take_effect() {
     let (mut physics, floor) = world_with_floor(1.0 / 60.0);
     let mut world = DeformableWorld::new();
     let body = world.insert(cube(DeformableMaterial::new(1e6, 0.3).mass_damping(3.0), 0.2)).unwrap();
-    let settle = |world: &mut DeformableWorld, physics: &mut PhysicsWorld| (0..240).for_each(|_| world.step(physics));
+    let settle =
+        |world: &mut DeformableWorld, physics: &mut PhysicsWorld| (0..240).for_each(|_| world.step(physics));
     settle(&mut world, &mut physics);
     let weight = 64.0 * G;
     let force = |world: &DeformableWorld| f64::from(world.contact_force(body, floor).y) / weight;
@@ -152,7 +166,9 @@ fn runtime_changes_take_effect() {
     settle(&mut world, &mut physics);
     assert!((force(&world) - 0.5).abs() < 1e-6);
     world.bodies[body].set_gravity_scale(1.0);
-    world.bodies[body].set_material(DeformableMaterial::new(1e5, 0.3).density(2000.0).mass_damping(3.0)).unwrap();
+    world.bodies[body]
+        .set_material(DeformableMaterial::new(1e5, 0.3).density(2000.0).mass_damping(3.0))
+        .unwrap();
     settle(&mut world, &mut physics);
     assert!((force(&world) - 2.0).abs() < 1e-6);
     let top = world.bodies[body].vertices_where(|x| x.y > 0.3);

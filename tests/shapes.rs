@@ -55,7 +55,10 @@ fn flat_topped_shapes_carry_a_cube() {
         ),
         ("heightfield", ColliderBuilder::heightfield(heights, Vector::new(2.0, 1.0, 2.0))),
         ("compound", down(ColliderBuilder::compound(parts))),
-        ("cone upside down", down(ColliderBuilder::cone(0.5, 0.5)).rotation(Vector::X * std::f32::consts::PI)),
+        (
+            "cone upside down",
+            down(ColliderBuilder::cone(0.5, 0.5)).rotation(Vector::X * std::f32::consts::PI),
+        ),
     ];
     for (name, shape) in shapes {
         let (height, force, speed) = settle(shape);
@@ -74,7 +77,10 @@ fn round_topped_shapes_carry_a_cube() {
     let shapes = [
         ("ball", down(ColliderBuilder::ball(0.5), 0.5)),
         ("capsule", down(ColliderBuilder::capsule_x(0.5, 0.3), 0.3)),
-        ("cylinder on its side", down(ColliderBuilder::cylinder(0.5, 0.4), 0.4).rotation(Vector::Z * std::f32::consts::FRAC_PI_2)),
+        (
+            "cylinder on its side",
+            down(ColliderBuilder::cylinder(0.5, 0.4), 0.4).rotation(Vector::Z * std::f32::consts::FRAC_PI_2),
+        ),
         ("small ball under one triangle", down(ColliderBuilder::ball(0.02), 0.02)),
     ];
     for (name, shape) in shapes {

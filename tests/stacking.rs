@@ -13,7 +13,8 @@ fn stands(ratio: f64, nu: f64, settings: SolverSettings) {
     let mut world = DeformableWorld::new();
     let body = world.insert(cube(DeformableMaterial::new(e, nu), 0.2).settings(settings)).unwrap();
     let top = ColliderBuilder::cuboid(0.2, 0.2, 0.2).density((box_mass / 0.064) as f32).friction(MU as f32);
-    let (load, top) = physics.insert(RigidBodyBuilder::dynamic().translation(Vector::Y * 0.6).can_sleep(false), top);
+    let (load, top) =
+        physics.insert(RigidBodyBuilder::dynamic().translation(Vector::Y * 0.6).can_sleep(false), top);
     for _ in 0..300 {
         world.step(&mut physics);
         assert_eq!(world.counters().contact_failures, 0, "{what}");
@@ -21,7 +22,8 @@ fn stands(ratio: f64, nu: f64, settings: SolverSettings) {
     let rigid = &physics.bodies[load];
     assert!(rigid.linvel().length() < 1e-3 && rigid.angvel().length() < 1e-2, "{what}: {}", rigid.linvel());
     assert!((rigid.translation().y - 0.58).abs() < 0.01, "{what}: at {}", rigid.translation());
-    let deepest = world.contacts().iter().map(|c| -c.gap).fold(depth_below_floor(&world.bodies[body]), f64::max);
+    let deepest =
+        world.contacts().iter().map(|c| -c.gap).fold(depth_below_floor(&world.bodies[body]), f64::max);
     assert!(deepest < 1e-4 * 0.4, "{what}: {deepest:e} m deep");
     let weight = (cube_mass + box_mass) * G;
     let carried = f64::from(world.contact_force(body, floor).y);

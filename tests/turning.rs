@@ -67,7 +67,8 @@ fn bar_hinged_on_an_edge_falls_as_a_rigid_one() {
         };
         let next = (S(1, 0) - S(0, 1)).atan2(S(0, 0) + S(1, 1));
         before = angle;
-        angle += (next - angle + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+        angle +=
+            (next - angle + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
         expected[usize::from(step > 12)] = -angle;
     }
     compare("rigid bar", hinged(1e9, 0.3, SolverSettings::default()), expected);

@@ -40,9 +40,8 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
             .linvel(body.linvel.into())
             .angvel(body.angvel.into())
             .can_sleep(body.can_sleep);
-        let mut collider = ColliderBuilder::new(shape(&body.shape)?)
-            .friction(body.friction)
-            .restitution(body.restitution);
+        let mut collider =
+            ColliderBuilder::new(shape(&body.shape)?).friction(body.friction).restitution(body.restitution);
         if let Some(mass) = &body.mass {
             collider = collider.mass(*mass.as_ref());
         }
@@ -81,7 +80,9 @@ fn shape(shape: &Shape) -> Result<SharedShape, String> {
     };
     Ok(match *shape {
         Shape::Ball { radius } => positive(&[radius]).map(|()| SharedShape::ball(radius))?,
-        Shape::Cuboid { half_extents: [x, y, z] } => positive(&[x, y, z]).map(|()| SharedShape::cuboid(x, y, z))?,
+        Shape::Cuboid { half_extents: [x, y, z] } => {
+            positive(&[x, y, z]).map(|()| SharedShape::cuboid(x, y, z))?
+        }
         Shape::Capsule { half_height, radius } => {
             positive(&[half_height, radius]).map(|()| SharedShape::capsule_y(half_height, radius))?
         }
@@ -100,8 +101,12 @@ fn shape(shape: &Shape) -> Result<SharedShape, String> {
 
 fn deformable(body: &file::Deformable, folder: &Path) -> Result<DeformableBodyBuilder, String> {
     let builder = match body.body.as_ref() {
-        Body::Lattice { half_extents, cells } => DeformableBodyBuilder::cuboid((*half_extents).into(), *cells),
-        Body::Filled { shape: filled, cell_size } => DeformableBodyBuilder::filled(&*shape(filled)?, *cell_size),
+        Body::Lattice { half_extents, cells } => {
+            DeformableBodyBuilder::cuboid((*half_extents).into(), *cells)
+        }
+        Body::Filled { shape: filled, cell_size } => {
+            DeformableBodyBuilder::filled(&*shape(filled)?, *cell_size)
+        }
         Body::Mesh { path } => DeformableBodyBuilder::gmsh(folder.join(path)),
     };
     let m = body.material.as_ref();
@@ -155,16 +160,17 @@ impl Stage {
         if let Some((_, handle)) = self.deformable.iter().find(|(name, _)| name == of) {
             return self.measure_deformable(quantity, *handle, on);
         }
-        let (position, speed) = if let Some((_, body, vertex)) = self.probes.iter().find(|(name, ..)| name == of) {
-            let body = &self.world.bodies[*body];
-            let speed = body.velocity(*vertex).map_or(f64::NAN, |[x, y, z]| x.hypot(y).hypot(z));
-            (body.position(*vertex).unwrap_or([f64::NAN; 3]), speed)
-        } else if let Some((_, handle, _)) = self.rigid.iter().find(|(name, ..)| name == of) {
-            let body = &self.physics.bodies[*handle];
-            (body.translation().to_array().map(f64::from), f64::from(body.linvel().length()))
-        } else {
-            return f64::NAN;
-        };
+        let (position, speed) =
+            if let Some((_, body, vertex)) = self.probes.iter().find(|(name, ..)| name == of) {
+                let body = &self.world.bodies[*body];
+                let speed = body.velocity(*vertex).map_or(f64::NAN, |[x, y, z]| x.hypot(y).hypot(z));
+                (body.position(*vertex).unwrap_or([f64::NAN; 3]), speed)
+            } else if let Some((_, handle, _)) = self.rigid.iter().find(|(name, ..)| name == of) {
+                let body = &self.physics.bodies[*handle];
+                (body.translation().to_array().map(f64::from), f64::from(body.linvel().length()))
+            } else {
+                return f64::NAN;
+            };
         match quantity {
             Quantity::X => position[0],
             Quantity::Y => position[1],

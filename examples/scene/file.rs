@@ -114,10 +114,18 @@ pub struct Deformable {
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Body {
-    Lattice { half_extents: Vec3, cells: [usize; 3] },
-    Filled { shape: Shape, cell_size: f32 },
+    Lattice {
+        half_extents: Vec3,
+        cells: [usize; 3],
+    },
+    Filled {
+        shape: Shape,
+        cell_size: f32,
+    },
     /// A Gmsh file, relative to the scene file.
-    Mesh { path: String },
+    Mesh {
+        path: String,
+    },
 }
 
 #[derive(Debug, Deserialize)]
@@ -254,7 +262,8 @@ fn at_line(text: &str, offset: usize, what: &str) -> String {
 type Mistake = (Range<usize>, String);
 
 fn check(scene: &Scene) -> Result<(), Mistake> {
-    let positive = |value: &Spanned<f32>, key: &str| match *value.as_ref() > 0.0 && value.as_ref().is_finite() {
+    let positive = |value: &Spanned<f32>, key: &str| match *value.as_ref() > 0.0 && value.as_ref().is_finite()
+    {
         true => Ok(()),
         false => Err((value.span(), format!("`{key}` is {}, but must be positive", value.as_ref()))),
     };
@@ -262,9 +271,14 @@ fn check(scene: &Scene) -> Result<(), Mistake> {
     positive(&scene.world.duration, "duration")?;
     let mut names: Vec<&Spanned<String>> = Vec::new();
     let rigid = scene.rigid.iter().map(|r| &r.name);
-    for name in rigid.chain(scene.deformable.iter().map(|d| &d.name)).chain(scene.probe.iter().map(|p| &p.name)) {
+    for name in
+        rigid.chain(scene.deformable.iter().map(|d| &d.name)).chain(scene.probe.iter().map(|p| &p.name))
+    {
         if names.iter().any(|n| n.as_ref() == name.as_ref()) {
-            return Err((name.span(), format!("`name` \"{}\" is taken; every name must be unique", name.as_ref())));
+            return Err((
+                name.span(),
+                format!("`name` \"{}\" is taken; every name must be unique", name.as_ref()),
+            ));
         }
         names.push(name);
     }
@@ -280,7 +294,12 @@ fn check(scene: &Scene) -> Result<(), Mistake> {
     let probe = |name: &str| scene.probe.iter().any(|p| p.name.as_ref() == name);
     for p in &scene.probe {
         if !deformable(p.of.as_ref()) {
-            return Err(unknown(&p.of, "of", "a deformable", &scene.deformable.iter().map(|d| d.name.as_ref().as_str()).collect::<Vec<_>>()));
+            return Err(unknown(
+                &p.of,
+                "of",
+                "a deformable",
+                &scene.deformable.iter().map(|d| d.name.as_ref().as_str()).collect::<Vec<_>>(),
+            ));
         }
     }
     let all: Vec<&str> = names.iter().map(|n| n.as_ref().as_str()).collect();
@@ -291,28 +310,44 @@ fn check(scene: &Scene) -> Result<(), Mistake> {
         }
         let of_deformable_only = matches!(e.quantity.as_ref(), Quantity::VolumeRatio | Quantity::Penetration);
         if of_deformable_only && !deformable(of) {
-            return Err((e.of.span(), format!("`of` must name a deformable for this quantity, and \"{of}\" is none")));
+            return Err((
+                e.of.span(),
+                format!("`of` must name a deformable for this quantity, and \"{of}\" is none"),
+            ));
         }
         if probe(of) && *e.quantity.as_ref() == Quantity::Force {
             return Err((e.of.span(), "a probe has no `force`; name its body".into()));
         }
         match (&e.on, *e.quantity.as_ref() == Quantity::Force) {
             (Some(on), true) if !rigid(on.as_ref()) => {
-                return Err(unknown(on, "on", "a rigid body", &scene.rigid.iter().map(|r| r.name.as_ref().as_str()).collect::<Vec<_>>()));
+                return Err(unknown(
+                    on,
+                    "on",
+                    "a rigid body",
+                    &scene.rigid.iter().map(|r| r.name.as_ref().as_str()).collect::<Vec<_>>(),
+                ));
             }
-            (None, true) => return Err((e.quantity.span(), "`force` needs `on`, the rigid body that touches".into())),
+            (None, true) => {
+                return Err((e.quantity.span(), "`force` needs `on`, the rigid body that touches".into()));
+            }
             (Some(on), false) => return Err((on.span(), "`on` is for the quantity `force` only".into())),
             _ => {}
         }
         if let Some(at) = &e.at {
             let end = *scene.world.duration.as_ref();
             if !(0.0..=end).contains(at.as_ref()) {
-                return Err((at.span(), format!("`at` is {} s, but the scene lasts from 0 to {end} s", at.as_ref())));
+                return Err((
+                    at.span(),
+                    format!("`at` is {} s, but the scene lasts from 0 to {end} s", at.as_ref()),
+                ));
             }
         }
         match (e.equals, e.at_most, e.at_least) {
             (None, None, None) => {
-                return Err((e.quantity.span(), "an expectation needs `equals`, `at_most` or `at_least`".into()));
+                return Err((
+                    e.quantity.span(),
+                    "an expectation needs `equals`, `at_most` or `at_least`".into(),
+                ));
             }
             (Some(_), ..) if e.within.is_none() => {
                 return Err((e.quantity.span(), "`equals` needs `within`, its tolerance".into()));
@@ -324,6 +359,7 @@ fn check(scene: &Scene) -> Result<(), Mistake> {
 }
 
 fn unknown(name: &Spanned<String>, key: &str, what: &str, right: &[&str]) -> Mistake {
-    let message = format!("`{key}` names \"{}\", which is not {what}; there are: {}", name.as_ref(), right.join(", "));
+    let message =
+        format!("`{key}` names \"{}\", which is not {what}; there are: {}", name.as_ref(), right.join(", "));
     (name.span(), message)
 }

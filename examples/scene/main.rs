@@ -73,7 +73,8 @@ fn run(path: &Path, out: &Path) -> Result<usize, String> {
         let time = step as f64 * dt;
         trace.record(time, &stage);
         for (expect, result) in scene.expect.iter().zip(&mut results) {
-            let due = expect.at.as_ref().map_or(step == steps, |at| time >= f64::from(*at.as_ref()) - 0.5 * dt);
+            let due =
+                expect.at.as_ref().map_or(step == steps, |at| time >= f64::from(*at.as_ref()) - 0.5 * dt);
             if result.is_none() && (due || step == steps) {
                 let on = expect.on.as_ref().map(|on| on.as_ref().as_str());
                 *result = Some(stage.measure(*expect.quantity.as_ref(), expect.of.as_ref(), on));
@@ -88,7 +89,8 @@ fn run(path: &Path, out: &Path) -> Result<usize, String> {
     trace.write_csv(&folder.join("trace.csv")).map_err(|e| e.to_string())?;
     trace.write_plot(&folder.join("plot.svg"), &name).map_err(|e| e.to_string())?;
     println!("\n  trace.csv and plot.svg are in {}", folder.display());
-    let verdicts = scene.expect.iter().zip(&results).map(|(expect, result)| verdict(expect, result.unwrap_or(f64::NAN)));
+    let verdicts =
+        scene.expect.iter().zip(&results).map(|(expect, result)| verdict(expect, result.unwrap_or(f64::NAN)));
     Ok(verdicts.filter(|met| !met).count())
 }
 
@@ -98,12 +100,21 @@ fn verdict(expect: &file::Expect, value: f64) -> bool {
     let met = expect.equals.is_none_or(near)
         && expect.at_most.is_none_or(|limit| value <= limit)
         && expect.at_least.is_none_or(|limit| value >= limit);
-    let wanted = [("equals", expect.equals), ("at_most", expect.at_most), ("at_least", expect.at_least), ("within", expect.within)];
-    let wanted: Vec<String> = wanted.iter().filter_map(|(name, v)| v.map(|v| format!("{name} {v}"))).collect();
+    let wanted = [
+        ("equals", expect.equals),
+        ("at_most", expect.at_most),
+        ("at_least", expect.at_least),
+        ("within", expect.within),
+    ];
+    let wanted: Vec<String> =
+        wanted.iter().filter_map(|(name, v)| v.map(|v| format!("{name} {v}"))).collect();
     let on = expect.on.as_ref().map_or(String::new(), |on| format!(" on {}", on.as_ref()));
     println!(
         "  {} {:?} of {}{on}: {value:.6e} ({})",
-        if met { "ok    " } else { "FAILED" }, expect.quantity.as_ref(), expect.of.as_ref(), wanted.join(", ")
+        if met { "ok    " } else { "FAILED" },
+        expect.quantity.as_ref(),
+        expect.of.as_ref(),
+        wanted.join(", ")
     );
     met
 }

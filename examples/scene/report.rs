@@ -120,7 +120,10 @@ impl StepCost {
 
 /// The table after a run.
 pub fn print_table(scene: &Scene, stage: &Stage, trace: &Trace) {
-    println!("\n  {:<14} {:>10} {:>11} {:>8} {:>12}  forces [N]", "body", "height [m]", "speed [m/s]", "volume", "deepest [m]");
+    println!(
+        "\n  {:<14} {:>10} {:>11} {:>8} {:>12}  forces [N]",
+        "body", "height [m]", "speed [m/s]", "volume", "deepest [m]"
+    );
     for (name, handle) in &stage.deformable {
         let m = |q| stage.measure(q, name, None);
         let forces: Vec<String> = stage
@@ -132,7 +135,11 @@ pub fn print_table(scene: &Scene, stage: &Stage, trace: &Trace) {
             .collect();
         println!(
             "  {name:<14} {:>10.5} {:>11.2e} {:>8.4} {:>12.2e}  {}",
-            m(Quantity::Y), m(Quantity::Speed), m(Quantity::VolumeRatio), m(Quantity::Penetration), forces.join(", ")
+            m(Quantity::Y),
+            m(Quantity::Speed),
+            m(Quantity::VolumeRatio),
+            m(Quantity::Penetration),
+            forces.join(", ")
         );
     }
     for ((name, ..), body) in stage.rigid.iter().zip(&scene.rigid) {
@@ -145,20 +152,31 @@ pub fn print_table(scene: &Scene, stage: &Stage, trace: &Trace) {
         let m = |q| stage.measure(q, name, None);
         println!("  {name:<14} {:>10.5} {:>11.2e}  (probe)", m(Quantity::Y), m(Quantity::Speed));
     }
-    println!("\n  {:<10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>11}", "per step", "detect", "factor", "solve", "advance", "total ms", "iter.", "residual N");
+    println!(
+        "\n  {:<10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>11}",
+        "per step", "detect", "factor", "solve", "advance", "total ms", "iter.", "residual N"
+    );
     let columns = |pick: &dyn Fn(&mut Vec<f64>) -> f64| {
         let of = |f: &dyn Fn(&StepCost) -> f64| pick(&mut trace.steps.iter().map(f).collect());
         [
-            of(&|s| s.detection), of(&|s| s.factor), of(&|s| s.solve), of(&|s| s.advance), of(&StepCost::total),
-            of(&|s| s.iterations), of(&|s| s.residual),
+            of(&|s| s.detection),
+            of(&|s| s.factor),
+            of(&|s| s.solve),
+            of(&|s| s.advance),
+            of(&StepCost::total),
+            of(&|s| s.iterations),
+            of(&|s| s.residual),
         ]
     };
     let line = |name: &str, [d, f, s, a, t, i, r]: [f64; 7]| {
         println!("  {name:<10} {d:>9.3} {f:>9.3} {s:>9.3} {a:>9.3} {t:>9.3} {i:>7.1} {r:>11.2e}");
     };
-    line("median", columns(&|v| {
-        v.sort_by(f64::total_cmp);
-        v.get(v.len() / 2).copied().unwrap_or(0.0)
-    }));
+    line(
+        "median",
+        columns(&|v| {
+            v.sort_by(f64::total_cmp);
+            v.get(v.len() / 2).copied().unwrap_or(0.0)
+        }),
+    );
     line("worst", columns(&|v| v.iter().copied().fold(0.0, f64::max)));
 }

@@ -298,11 +298,7 @@ impl DeformableBody {
     /// [`BodyError::NoSuchVertex`].
     pub fn pin(&mut self, vertex: usize) -> Result<(), BodyError> {
         let node = self.node(vertex)?;
-        let pin = Pin {
-            node: node as u32,
-            target: self.state.x[node],
-            force: Vec3::zeros(),
-        };
+        let pin = Pin { node: node as u32, target: self.state.x[node], force: Vec3::zeros() };
         match self.pin_place(node) {
             Ok(place) => self.pins[place] = pin,
             Err(place) => self.pins.insert(place, pin),
@@ -510,10 +506,7 @@ impl DeformableBody {
     }
 
     fn node(&self, vertex: usize) -> Result<usize, BodyError> {
-        self.model.node(vertex).ok_or(BodyError::NoSuchVertex {
-            vertex,
-            vertices: self.vertex_count(),
-        })
+        self.model.node(vertex).ok_or(BodyError::NoSuchVertex { vertex, vertices: self.vertex_count() })
     }
 
     fn pin_place(&self, node: usize) -> Result<usize, usize> {

@@ -107,9 +107,7 @@ fn damping_response(
     let deviation = F.minus(&turned);
     let trace = rotation.dot(F) - (stretch.at(0, 0) + stretch.at(1, 1) + stretch.at(2, 2));
     let density = deviation.dot(&deviation) * mu + trace * trace * (0.5 * lambda);
-    let stress = deviation
-        .scaled(Lane::splat(2.0 * mu))
-        .plus_scaled(rotation, trace * lambda);
+    let stress = deviation.scaled(Lane::splat(2.0 * mu)).plus_scaled(rotation, trace * lambda);
     (density, stress)
 }
 

@@ -4,9 +4,9 @@
 //! Architecture invariant: vertex indices at the surface of this module are the user's; inside,
 //! nodes are renumbered for locality, and only `DeformableModel` translates.
 
-mod builder;
 #[allow(clippy::module_inception)]
 mod body;
+mod builder;
 pub(crate) mod elastic;
 mod model;
 mod set;

@@ -56,11 +56,8 @@ impl DeformableModel {
             node_of_vertex[vertex as usize] = node as u32;
         }
         let rest: Vec<Vec3> = vertex_of_node.iter().map(|&v| at_rest[v as usize]).collect();
-        let mut tetrahedra: Vec<[u32; 4]> = mesh
-            .tetrahedra()
-            .iter()
-            .map(|t| t.map(|v| node_of_vertex[v as usize]))
-            .collect();
+        let mut tetrahedra: Vec<[u32; 4]> =
+            mesh.tetrahedra().iter().map(|t| t.map(|v| node_of_vertex[v as usize])).collect();
         // Neighbouring elements touch neighbouring memory.
         tetrahedra.sort_by_key(|t| t.iter().sum::<u32>());
         let mut node_volumes = vec![0.0; rest.len()];
@@ -146,11 +143,8 @@ impl DeformableModel {
 
 impl ElementBlock {
     fn new(tetrahedra: &[[u32; 4]], rest: &[Vec3]) -> Self {
-        let mut block = Self {
-            corners: [[0; LANES]; 4],
-            gradients: [[Lane::default(); 3]; 3],
-            volumes: Lane::default(),
-        };
+        let mut block =
+            Self { corners: [[0; LANES]; 4], gradients: [[Lane::default(); 3]; 3], volumes: Lane::default() };
         for i in 0..LANES {
             // The last block is filled up with copies of its last element, without volume.
             let tet = tetrahedra[i.min(tetrahedra.len() - 1)];

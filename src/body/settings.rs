@@ -80,10 +80,6 @@ impl Default for SolverSettings {
 impl SolverSettings {
     /// Exactly this many iterations, unless nothing but rounding is left before.
     pub fn iterations(count: usize) -> Self {
-        Self {
-            max_iterations: count,
-            tolerance: 0.0,
-            ..Self::default()
-        }
+        Self { max_iterations: count, tolerance: 0.0, ..Self::default() }
     }
 }

@@ -37,10 +37,7 @@ pub(crate) fn project(u: [f64; 3], mu: f64) -> Projected {
     }
     let normal = (u[0] + mu * slip) / (1.0 + mu * mu);
     let scale = mu * normal / slip;
-    Projected {
-        force: [normal, scale * u[1], scale * u[2]],
-        state: ConeState::Slip,
-    }
+    Projected { force: [normal, scale * u[1], scale * u[2]], state: ConeState::Slip }
 }
 
 /// Columns of `L` with `L Lᵀ = (1/R)·∂force/∂u` at `u`: the curvature of the contact, in `1/R`.

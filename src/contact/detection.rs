@@ -106,10 +106,7 @@ impl Detector {
             obstacle,
             model,
             extent: obstacle.shape.compute_local_aabb(),
-            scales: Scales {
-                band: BAND * model.size,
-                shift: SHIFT * surface.mean_edge,
-            },
+            scales: Scales { band: BAND * model.size, shift: SHIFT * surface.mean_edge },
             motion: if moves { surface.nodes.iter().map(motion).fold(0.0, f64::max) } else { 0.0 },
         };
         self.detect_nodes(&scene, rows);
@@ -286,21 +283,10 @@ impl Scene<'_> {
 
     fn row(&self, nodes: [u32; 3], weights: [f64; 3], found: &SurfacePoint, feature: u32) -> Row {
         let obstacle = self.obstacle;
-        let soft = Side::Soft {
-            body: self.pair.body,
-            nodes,
-            weights,
-        };
-        let partner = Side::Partner {
-            partner: obstacle.partner,
-            point: obstacle.start.transform(&found.point),
-        };
-        let key = ContactKey {
-            obstacle: obstacle.key,
-            part: obstacle.part,
-            feature,
-            slot: 0,
-        };
+        let soft = Side::Soft { body: self.pair.body, nodes, weights };
+        let partner =
+            Side::Partner { partner: obstacle.partner, point: obstacle.start.transform(&found.point) };
+        let key = ContactKey { obstacle: obstacle.key, part: obstacle.part, feature, slot: 0 };
         let normal = obstacle.start.rotation * found.normal;
         let mut row = Row::new([soft, partner], normal.normalize(), found.gap, key);
         row.friction = self.pair.friction;

@@ -53,9 +53,10 @@ impl Obstacle {
     pub fn solidity(&self) -> Solidity {
         match self.shape.as_typed_shape() {
             TypedShape::TriMesh(mesh) if mesh.pseudo_normals_if_oriented().is_none() => Solidity::Sheet,
-            TypedShape::HeightField(_) | TypedShape::Triangle(_) | TypedShape::Segment(_) | TypedShape::Polyline(_) => {
-                Solidity::Sheet
-            }
+            TypedShape::HeightField(_)
+            | TypedShape::Triangle(_)
+            | TypedShape::Segment(_)
+            | TypedShape::Polyline(_) => Solidity::Sheet,
             _ => Solidity::Solid,
         }
     }

@@ -32,7 +32,10 @@ pub(crate) fn rim_crossing(
     scales: &Scales,
 ) -> Option<(f64, SurfacePoint)> {
     let faces = on_face.normal.dot(outward) < FACING;
-    if !faces || !is_over_face(obstacle, on_face, inner, scales) || is_over_face(obstacle, on_face, outer, scales) {
+    if !faces
+        || !is_over_face(obstacle, on_face, inner, scales)
+        || is_over_face(obstacle, on_face, outer, scales)
+    {
         return None;
     }
     let at = |t: f64| inner + (outer - inner) * t;
@@ -47,11 +50,7 @@ pub(crate) fn rim_crossing(
     }
     let p = at(over);
     let gap = on_face.normal.dot(&(p - on_face.point));
-    let row = SurfacePoint {
-        point: p - on_face.normal * gap,
-        gap,
-        ..*on_face
-    };
+    let row = SurfacePoint { point: p - on_face.normal * gap, gap, ..*on_face };
     (over > AT_NODE && gap > -2.0 * scales.shift).then_some((over, row))
 }
 
@@ -99,11 +98,6 @@ pub(crate) fn corner_on_triangle(
         return None;
     }
     let weights = barycentric(corners, corner)?;
-    let row = SurfacePoint {
-        point: *corner,
-        normal: -outward,
-        gap,
-        flat: false,
-    };
+    let row = SurfacePoint { point: *corner, normal: -outward, gap, flat: false };
     weights.iter().all(|w| *w >= 0.0).then_some((weights, row))
 }

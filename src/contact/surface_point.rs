@@ -101,12 +101,7 @@ pub(crate) fn is_over_face(obstacle: &Obstacle, on_face: &SurfacePoint, p: &Vec3
 fn on_ball(radius: f64, p: &Vec3, outward: &Vec3) -> Option<SurfacePoint> {
     let distance = p.norm();
     let normal = if distance > 0.0 { p / distance } else { -outward };
-    Some(SurfacePoint {
-        point: normal * radius,
-        normal,
-        gap: distance - radius,
-        flat: false,
-    })
+    Some(SurfacePoint { point: normal * radius, normal, gap: distance - radius, flat: false })
 }
 
 /// A projection with what can be told of it.
@@ -237,8 +232,17 @@ mod tests {
                 let found = surface_point(&obstacle, &p, &-top.normal, &SCALES).unwrap();
                 // f32 projections: 1e-7 of coordinates of 1 m, over the shift of 0.01 m and the
                 // curvature of GJK's round shapes; gaps to a few ulp of f32.
-                assert!((found.normal - top.normal).norm() < 2e-3, "{kind:?} {depth}: {} {}", found.normal, top.normal);
-                assert!((found.gap - depth).abs() < 2e-6 + 2e-3 * depth.abs(), "{kind:?} {depth}: {}", found.gap);
+                assert!(
+                    (found.normal - top.normal).norm() < 2e-3,
+                    "{kind:?} {depth}: {} {}",
+                    found.normal,
+                    top.normal
+                );
+                assert!(
+                    (found.gap - depth).abs() < 2e-6 + 2e-3 * depth.abs(),
+                    "{kind:?} {depth}: {}",
+                    found.gap
+                );
             }
         }
     }
@@ -257,11 +261,8 @@ mod tests {
 
     #[test]
     fn sheets_push_back_to_the_side_the_body_is_on() {
-        let vertices = vec![
-            Vector::new(-1.0, 0.0, -1.0),
-            Vector::new(1.0, 0.0, -1.0),
-            Vector::new(0.0, 0.0, 1.0),
-        ];
+        let vertices =
+            vec![Vector::new(-1.0, 0.0, -1.0), Vector::new(1.0, 0.0, -1.0), Vector::new(0.0, 0.0, 1.0)];
         for triangle in [[0, 1, 2], [0, 2, 1]] {
             let mesh = SharedShape::trimesh(vertices.clone(), vec![triangle]).unwrap();
             let obstacle = obstacle(mesh);

@@ -56,12 +56,7 @@ pub(crate) fn triangle_point<'a>(
     }
     let here = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
     let gap = normal.dot(&(here - point));
-    let surface = SurfacePoint {
-        point,
-        normal,
-        gap,
-        flat: false,
-    };
+    let surface = SurfacePoint { point, normal, gap, flat: false };
     let parallel = known.filter(|k| k.normal.dot(&normal) > PARALLEL);
     let said = parallel.map(|k| k.gap).fold(f64::INFINITY, f64::min);
     (gap < reach && gap < said - scales.band).then_some(TrianglePoint { weights, surface })

@@ -6,7 +6,9 @@ use crate::contact::{Obstacle, PartnerId};
 use crate::math::{Mat3, Pose64, Vec3, from_real, rotation_from_vector};
 use crate::solver::Partner;
 use parry3d::shape::{SharedShape, TypedShape};
-use rapier3d::dynamics::{CoefficientCombineRule, RigidBody, RigidBodyHandle, RigidBodyMassProps, RigidBodyType};
+use rapier3d::dynamics::{
+    CoefficientCombineRule, RigidBody, RigidBodyHandle, RigidBodyMassProps, RigidBodyType,
+};
 use rapier3d::geometry::{Collider, ColliderHandle, InteractionGroups};
 use rapier3d::math::Vector;
 use std::collections::HashMap;
@@ -180,9 +182,15 @@ fn partner_of(
             let masses = current_mass_properties(sets, body);
             let inertia = masses.effective_world_inv_inertia;
             let inv_inertia = Mat3::new(
-                inertia.m11.into(), inertia.m12.into(), inertia.m13.into(),
-                inertia.m12.into(), inertia.m22.into(), inertia.m23.into(),
-                inertia.m13.into(), inertia.m23.into(), inertia.m33.into(),
+                inertia.m11.into(),
+                inertia.m12.into(),
+                inertia.m13.into(),
+                inertia.m12.into(),
+                inertia.m22.into(),
+                inertia.m23.into(),
+                inertia.m13.into(),
+                inertia.m23.into(),
+                inertia.m33.into(),
             );
             let inv_mass = from_real(masses.effective_inv_mass);
             let force = from_real(external_force(body, &masses, gravity));
@@ -226,10 +234,7 @@ fn end_pose(partner: &Partner, start: &Pose64, dt: f64) -> Pose64 {
         Partner::Rigid { com, free_linvel, free_angvel, .. } => {
             let turn = rotation_from_vector(&(free_angvel * dt));
             let origin: Vec3 = com + free_linvel * dt + turn * (start.translation - com);
-            Pose64 {
-                rotation: turn * start.rotation,
-                translation: origin,
-            }
+            Pose64 { rotation: turn * start.rotation, translation: origin }
         }
     }
 }

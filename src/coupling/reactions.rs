@@ -46,7 +46,9 @@ impl Reactions {
             }
             let impulse = to_real(&reaction.impulse);
             let torque_impulse = to_real(&reaction.torque_impulse);
-            let Some(body) = bodies.get_mut(handle).filter(|_| impulse.is_finite() && torque_impulse.is_finite()) else {
+            let Some(body) =
+                bodies.get_mut(handle).filter(|_| impulse.is_finite() && torque_impulse.is_finite())
+            else {
                 continue;
             };
             let (force, torque) = (body.user_force(), body.user_torque());

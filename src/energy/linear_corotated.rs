@@ -22,9 +22,7 @@ impl ElementEnergy for LinearCorotated {
         let trace = rotation.dot(&deviation);
         Response {
             density: deviation.dot(&deviation) * mu + trace * trace * (0.5 * lambda),
-            stress: deviation
-                .scaled(Lane::splat(2.0 * mu))
-                .plus_scaled(&rotation, trace * lambda),
+            stress: deviation.scaled(Lane::splat(2.0 * mu)).plus_scaled(&rotation, trace * lambda),
             rotation,
         }
     }

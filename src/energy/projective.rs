@@ -27,9 +27,7 @@ impl ElementEnergy for Projective {
         }
         Response {
             density: shape.dot(&shape) * mu + volume.dot(&volume) * (1.5 * lambda),
-            stress: shape
-                .scaled(Lane::splat(2.0 * mu))
-                .plus_scaled(&volume, Lane::splat(3.0 * lambda)),
+            stress: shape.scaled(Lane::splat(2.0 * mu)).plus_scaled(&volume, Lane::splat(3.0 * lambda)),
             rotation,
         }
     }
@@ -62,7 +60,8 @@ fn nearest_of_unit_product(sigma: &Vec3) -> Vec3 {
         let s = t.map(f64::exp);
         // Gradient and (diagonal, made positive) Hessian of ½Σ(eᵗ − σ)².
         let gradient = (s - sigma).component_mul(&s);
-        let hessian = (2.0 * s - sigma).component_mul(&s).zip_map(&s.component_mul(&s), |h, g| h.max(0.1 * g));
+        let hessian =
+            (2.0 * s - sigma).component_mul(&s).zip_map(&s.component_mul(&s), |h, g| h.max(0.1 * g));
         let inverse = hessian.map(|h| 1.0 / h);
         // The multiplier keeps Σ dt = 0.
         let nu = gradient.dot(&inverse) / inverse.sum();

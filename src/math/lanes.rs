@@ -39,11 +39,6 @@ impl Lane {
     }
 
     #[inline(always)]
-    pub fn sqrt(self) -> Self {
-        self.map(f64::sqrt)
-    }
-
-    #[inline(always)]
     pub fn sum(self) -> f64 {
         self.0.iter().sum()
     }

@@ -34,10 +34,7 @@ pub(crate) fn tangents(n: &Vec3) -> [Vec3; 2] {
     let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (sign + n.z);
     let b = n.x * n.y * a;
-    [
-        Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
-        Vec3::new(b, sign + n.y * n.y * a, -n.y),
-    ]
+    [Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vec3::new(b, sign + n.y * n.y * a, -n.y)]
 }
 
 /// A rigid motion `x ↦ R x + t` in `f64`.
@@ -53,13 +50,8 @@ impl Pose64 {
     pub fn from_real(pose: &rapier3d::math::Pose) -> Self {
         let q = pose.rotation;
         let q = nalgebra::Quaternion::new(q.w as f64, q.x as f64, q.y as f64, q.z as f64);
-        let rotation = nalgebra::UnitQuaternion::from_quaternion(q)
-            .to_rotation_matrix()
-            .into_inner();
-        Self {
-            rotation,
-            translation: from_real(pose.translation),
-        }
+        let rotation = nalgebra::UnitQuaternion::from_quaternion(q).to_rotation_matrix().into_inner();
+        Self { rotation, translation: from_real(pose.translation) }
     }
 
     /// Moves a point from the local frame to the world.
@@ -74,10 +66,7 @@ impl Pose64 {
 
     /// `self ∘ other`.
     pub fn compose(&self, other: &Self) -> Self {
-        Self {
-            rotation: self.rotation * other.rotation,
-            translation: self.transform(&other.translation),
-        }
+        Self { rotation: self.rotation * other.rotation, translation: self.transform(&other.translation) }
     }
 }
 

@@ -24,9 +24,8 @@ pub(crate) fn polar_rotations(F: &LaneMat3) -> LaneMat3 {
     let norm2 = F.dot(F);
     let mut easy = true;
     let cofactor = R.cofactor();
-    let det0 = R.at(0, 0) * cofactor.at(0, 0)
-        + R.at(0, 1) * cofactor.at(0, 1)
-        + R.at(0, 2) * cofactor.at(0, 2);
+    let det0 =
+        R.at(0, 0) * cofactor.at(0, 0) + R.at(0, 1) * cofactor.at(0, 1) + R.at(0, 2) * cofactor.at(0, 2);
     for i in 0..LANES {
         let n = norm2.0[i];
         easy &= det0.0[i] > FLAT * n * n.sqrt();
@@ -44,9 +43,8 @@ pub(crate) fn polar_rotations(F: &LaneMat3) -> LaneMat3 {
 fn newton(R: &mut LaneMat3) -> bool {
     for _ in 0..MAX_NEWTON {
         let cofactor = R.cofactor();
-        let det = R.at(0, 0) * cofactor.at(0, 0)
-            + R.at(0, 1) * cofactor.at(0, 1)
-            + R.at(0, 2) * cofactor.at(0, 2);
+        let det =
+            R.at(0, 0) * cofactor.at(0, 0) + R.at(0, 1) * cofactor.at(0, 1) + R.at(0, 2) * cofactor.at(0, 2);
         let half_inv = Lane::splat(0.5) / det;
         let mut change = Lane::default();
         for k in 0..9 {
@@ -94,19 +92,13 @@ pub(crate) fn polar_rotation(F: &Mat3) -> Mat3 {
     let eigen = K.symmetric_eigen();
     let q = eigen.eigenvectors.column(eigen.eigenvalues.imax());
     let q = Quaternion::new(q[0], q[1], q[2], q[3]);
-    let mut R = UnitQuaternion::from_quaternion(q)
-        .to_rotation_matrix()
-        .into_inner();
+    let mut R = UnitQuaternion::from_quaternion(q).to_rotation_matrix().into_inner();
     // One Newton step on the rotation takes out the eigensolver's last digits where the
     // optimum is sharp: ω = (tr S·I − S)⁻¹ axl(RᵀF − FᵀR).
     let S = R.tr_mul(F) / scale;
     let sym = (S + S.transpose()) * 0.5;
     let H = Mat3::identity() * sym.trace() - sym;
-    let axl = Vec3::new(
-        S[(2, 1)] - S[(1, 2)],
-        S[(0, 2)] - S[(2, 0)],
-        S[(1, 0)] - S[(0, 1)],
-    );
+    let axl = Vec3::new(S[(2, 1)] - S[(1, 2)], S[(0, 2)] - S[(2, 0)], S[(1, 0)] - S[(0, 1)]);
     if let Some(omega) = H.try_inverse().map(|inverse| inverse * axl)
         && omega.norm() < 1.0e-4
     {

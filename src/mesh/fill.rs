@@ -33,21 +33,14 @@ impl TetMesh {
     ) -> Result<Self, MeshError> {
         for (tet, &vertex) in triangles.iter().flatten().enumerate() {
             if vertex as usize >= vertices.len() {
-                return Err(MeshError::IndexOutOfRange {
-                    tet: tet / 3,
-                    vertex,
-                    vertices: vertices.len(),
-                });
+                return Err(MeshError::IndexOutOfRange { tet: tet / 3, vertex, vertices: vertices.len() });
             }
         }
         if let Some(vertex) = vertices.iter().position(|v| !v.is_finite()) {
             let position = vertices[vertex].to_array().map(f64::from);
             return Err(MeshError::NotFinite { vertex, position });
         }
-        let nothing = MeshError::NothingEnclosed {
-            triangles: triangles.len(),
-            cell_size,
-        };
+        let nothing = MeshError::NothingEnclosed { triangles: triangles.len(), cell_size };
         let volume = signed_volume_of(vertices, triangles);
         if triangles.is_empty() || volume <= 0.0 {
             return Err(nothing);

@@ -14,10 +14,7 @@ impl TetMesh {
     /// [`MeshError::File`] when the file cannot be read or parsed, else as [`TetMesh::new`].
     pub fn read_gmsh(path: impl AsRef<Path>) -> Result<Self, MeshError> {
         let path = path.as_ref();
-        let fail = |reason: String| MeshError::File {
-            path: path.display().to_string(),
-            reason,
-        };
+        let fail = |reason: String| MeshError::File { path: path.display().to_string(), reason };
         let bytes = std::fs::read(path).map_err(|e| fail(e.to_string()))?;
         // The parser's message spans several lines and quotes the file; its first says what failed.
         let file = mshio::parse_msh_bytes(&bytes)
@@ -41,8 +38,9 @@ fn tetrahedra_of(file: &MshFile<u64, i32, f64>) -> Result<Geometry, String> {
         for block in &nodes.node_blocks {
             let place = |n: &mshio::mshfile::Node<f64>| [n.x, n.y, n.z];
             match &block.node_tags {
-                Some(tags) => position_of_tag
-                    .extend(tags.iter().map(|(&tag, &k)| (tag, place(&block.nodes[k])))),
+                Some(tags) => {
+                    position_of_tag.extend(tags.iter().map(|(&tag, &k)| (tag, place(&block.nodes[k]))))
+                }
                 None => position_of_tag.extend((next..).zip(block.nodes.iter().map(place))),
             }
             next += block.nodes.len() as u64;

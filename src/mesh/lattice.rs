@@ -22,10 +22,7 @@ impl TetMesh {
     /// [`MeshError::BadLattice`] when an axis has no cells or no extent, [`MeshError::TooLarge`].
     pub fn cuboid(half_extents: [f64; 3], cells: [usize; 3]) -> Result<Self, MeshError> {
         if cells.contains(&0) || !half_extents.iter().all(|&e| e.is_finite() && e > 0.0) {
-            return Err(MeshError::BadLattice {
-                cells,
-                half_extents,
-            });
+            return Err(MeshError::BadLattice { cells, half_extents });
         }
         let nodes = cells.map(|c| c.saturating_add(1));
         let vertices = nodes.iter().fold(1usize, |a, &b| a.saturating_mul(b));

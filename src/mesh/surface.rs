@@ -31,20 +31,14 @@ impl Surface {
         let triangles = boundary_triangles(tetrahedra).unwrap_or_default();
         let mut index_of_node = vec![u32::MAX; rest.len()];
         triangles.iter().flatten().for_each(|&n| index_of_node[n as usize] = 0);
-        let nodes: Vec<u32> = (0..rest.len() as u32)
-            .filter(|&n| index_of_node[n as usize] == 0)
-            .collect();
+        let nodes: Vec<u32> = (0..rest.len() as u32).filter(|&n| index_of_node[n as usize] == 0).collect();
         for (i, &n) in nodes.iter().enumerate() {
             index_of_node[n as usize] = i as u32;
         }
         let edges: Vec<[u32; 2]> = edge_uses(&triangles).into_iter().map(|u| u.edge).collect();
-        let find = |a: u32, b: u32| {
-            edges.binary_search(&[a.min(b), a.max(b)]).unwrap_or(0) as u32
-        };
-        let triangle_edges: Vec<[u32; 3]> = triangles
-            .iter()
-            .map(|&[a, b, c]| [find(b, c), find(c, a), find(a, b)])
-            .collect();
+        let find = |a: u32, b: u32| edges.binary_search(&[a.min(b), a.max(b)]).unwrap_or(0) as u32;
+        let triangle_edges: Vec<[u32; 3]> =
+            triangles.iter().map(|&[a, b, c]| [find(b, c), find(c, a), find(a, b)]).collect();
         let mut edge_triangles = vec![[u32::MAX; 2]; edges.len()];
         for (t, of_triangle) in triangle_edges.iter().enumerate() {
             for &e in of_triangle {
@@ -54,26 +48,14 @@ impl Surface {
         }
         let length = |e: &[u32; 2]| (rest[e[0] as usize] - rest[e[1] as usize]).norm();
         let mean_edge = edges.iter().map(length).sum::<f64>() / edges.len().max(1) as f64;
-        Self {
-            triangles,
-            nodes,
-            edges,
-            triangle_edges,
-            edge_triangles,
-            index_of_node,
-            mean_edge,
-        }
+        Self { triangles, nodes, edges, triangle_edges, edge_triangles, index_of_node, mean_edge }
     }
 }
 
 /// Faces that belong to one tetrahedron only, sorted by their first appearance; or a face that
 /// more than two share, with their number.
-pub(crate) fn boundary_triangles(
-    tetrahedra: &[[u32; 4]],
-) -> Result<Vec<[u32; 3]>, ([u32; 3], usize)> {
-    let faces = tetrahedra
-        .iter()
-        .flat_map(|t| FACES.map(|f| f.map(|k| t[k])));
+pub(crate) fn boundary_triangles(tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32; 3]>, ([u32; 3], usize)> {
+    let faces = tetrahedra.iter().flat_map(|t| FACES.map(|f| f.map(|k| t[k])));
     let mut count: HashMap<[u32; 3], usize> = HashMap::with_capacity(2 * tetrahedra.len());
     for face in faces.clone() {
         *count.entry(sorted(face)).or_default() += 1;
@@ -98,13 +80,7 @@ pub(crate) fn edge_uses(triangles: &[[u32; 3]]) -> Vec<EdgeUse> {
         .map(|[a, b]| [a.min(b), a.max(b)])
         .collect();
     edges.sort_unstable();
-    edges
-        .chunk_by(|a, b| a == b)
-        .map(|run| EdgeUse {
-            edge: run[0],
-            count: run.len(),
-        })
-        .collect()
+    edges.chunk_by(|a, b| a == b).map(|run| EdgeUse { edge: run[0], count: run.len() }).collect()
 }
 
 fn sorted(mut face: [u32; 3]) -> [u32; 3] {
@@ -124,8 +100,7 @@ mod tests {
         let surface = Surface::new(mesh.tetrahedra(), &rest);
         assert_eq!(surface.triangles.len(), 2 * 2 * (4 * 3 + 3 * 2 + 4 * 2));
         // Euler: V − E + F = 2.
-        let euler = surface.nodes.len() as i64 - surface.edges.len() as i64
-            + surface.triangles.len() as i64;
+        let euler = surface.nodes.len() as i64 - surface.edges.len() as i64 + surface.triangles.len() as i64;
         assert_eq!(euler, 2);
         // Divergence theorem, 1e-15 roundings of O(1) terms.
         let volume: f64 = surface

@@ -168,11 +168,7 @@ impl TetMesh {
             return Err(MeshError::UnusedVertex { vertex });
         }
         check_surface(&tetrahedra)?;
-        Ok(Self {
-            vertices,
-            tetrahedra,
-            volumes,
-        })
+        Ok(Self { vertices, tetrahedra, volumes })
     }
 
     /// Rest positions [m], one per vertex.
@@ -199,11 +195,7 @@ impl TetMesh {
 fn check_indices(tet: usize, corners: &[u32; 4], vertices: usize) -> Result<(), MeshError> {
     for (k, &vertex) in corners.iter().enumerate() {
         if vertex as usize >= vertices {
-            return Err(MeshError::IndexOutOfRange {
-                tet,
-                vertex,
-                vertices,
-            });
+            return Err(MeshError::IndexOutOfRange { tet, vertex, vertices });
         }
         if corners[..k].contains(&vertex) {
             return Err(MeshError::RepeatedVertex { tet, vertex });
@@ -233,8 +225,8 @@ pub(crate) fn signed_volume(p: &[Vec3; 4]) -> f64 {
 }
 
 fn check_surface(tetrahedra: &[[u32; 4]]) -> Result<(), MeshError> {
-    let triangles = boundary_triangles(tetrahedra)
-        .map_err(|(face, count)| MeshError::NonManifoldFace { face, count })?;
+    let triangles =
+        boundary_triangles(tetrahedra).map_err(|(face, count)| MeshError::NonManifoldFace { face, count })?;
     for EdgeUse { edge, count } in edge_uses(&triangles) {
         if count != 2 {
             return Err(MeshError::NonManifoldEdge { edge, count });
@@ -264,10 +256,7 @@ mod tests {
             tet(corner(), vec![[0, 1, 2, 4]]),
             MeshError::IndexOutOfRange { tet: 0, vertex: 4, vertices: 4 }
         ));
-        assert!(matches!(
-            tet(corner(), vec![[0, 1, 2, 2]]),
-            MeshError::RepeatedVertex { tet: 0, vertex: 2 }
-        ));
+        assert!(matches!(tet(corner(), vec![[0, 1, 2, 2]]), MeshError::RepeatedVertex { tet: 0, vertex: 2 }));
         let mut flat = corner();
         flat[3] = [0.3, 0.3, 1e-12];
         assert!(matches!(tet(flat, vec![[0, 1, 2, 3]]), MeshError::Flat { tet: 0, .. }));

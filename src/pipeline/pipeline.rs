@@ -66,11 +66,7 @@ impl DeformablePipeline {
             return;
         }
         let h = f64::from(dt);
-        let sets = RapierSets {
-            bodies,
-            colliders,
-            multibody_joints,
-        };
+        let sets = RapierSets { bodies, colliders, multibody_joints };
         let mut clock = Clock::start();
         self.read_obstacles(sets, gravity, h);
         self.predict(deformables, gravity, h);
@@ -268,14 +264,16 @@ fn quarantine(body: &mut DeformableBody, counters: &mut DeformableCounters) {
     counters.quarantined += 1;
 }
 
-fn store(body: &mut DeformableBody, work: &IslandWork, local: usize, h: f64, counters: &mut DeformableCounters) {
+fn store(
+    body: &mut DeformableBody,
+    work: &IslandWork,
+    local: usize,
+    h: f64,
+    counters: &mut DeformableCounters,
+) {
     let problem = &work.island.bodies[local];
-    for ((v, x), (new, old)) in body
-        .state
-        .v
-        .iter_mut()
-        .zip(&mut body.state.x)
-        .zip(problem.current.x.iter().zip(&problem.x_start))
+    for ((v, x), (new, old)) in
+        body.state.v.iter_mut().zip(&mut body.state.x).zip(problem.current.x.iter().zip(&problem.x_start))
     {
         *v = (new - old) / h;
         *x = *new;

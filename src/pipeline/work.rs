@@ -58,11 +58,7 @@ impl BodyWork {
                 continue;
             };
             let obstacle = &scene.obstacles[o as usize];
-            let pair = Pair {
-                body: index,
-                friction,
-                restitution,
-            };
+            let pair = Pair { body: index, friction, restitution };
             self.pairs += 1;
             let memory = body.state.contacts_with(obstacle.key, obstacle.part);
             self.detector.detect(&pair, obstacle, model, x, memory, &mut self.rows);

@@ -273,7 +273,8 @@ impl BodyProblem {
     /// Force [N] with which the `k`-th pin holds its node.
     pub fn pin_force(&self, k: usize) -> Vec3 {
         let node = self.key.pins[k] as usize;
-        let inertia = (self.pinned_inertia[k] - self.current.x[node]) * (self.masses[node] / (self.h * self.h));
+        let inertia =
+            (self.pinned_inertia[k] - self.current.x[node]) * (self.masses[node] / (self.h * self.h));
         -(inertia + self.current.r[node] + self.contact_force[node])
     }
 

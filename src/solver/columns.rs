@@ -21,11 +21,7 @@ pub(crate) struct Columns {
 
 impl Columns {
     pub fn new(surface: &Surface, system: SystemMatrix) -> Self {
-        Self {
-            d: dimension(system),
-            columns: vec![None; surface.nodes.len()],
-            made: 0,
-        }
+        Self { d: dimension(system), columns: vec![None; surface.nodes.len()], made: 0 }
     }
 
     /// Makes the columns at these surface nodes (indices into `Surface::nodes`) that are not there
@@ -39,9 +35,7 @@ impl Columns {
         surface_nodes: impl Iterator<Item = u32>,
         scratch: &mut FactorScratch,
     ) -> usize {
-        let mut missing: Vec<u32> = surface_nodes
-            .filter(|&s| self.columns[s as usize].is_none())
-            .collect();
+        let mut missing: Vec<u32> = surface_nodes.filter(|&s| self.columns[s as usize].is_none()).collect();
         missing.sort_unstable();
         missing.dedup();
         let (d, nodes) = (self.d, &model.surface.nodes);

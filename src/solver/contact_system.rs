@@ -50,7 +50,13 @@ impl ContactSystem {
     }
 
     /// Packs the rows for a step of `h` [s], with their warm starts, which are laid on the nodes.
-    pub fn begin(&mut self, bodies: &mut [BodyProblem], partners: &[Partner], h: f64, limits: &ContactLimits) {
+    pub fn begin(
+        &mut self,
+        bodies: &mut [BodyProblem],
+        partners: &[Partner],
+        h: f64,
+        limits: &ContactLimits,
+    ) {
         self.problem.offsets.clear();
         self.problem.offsets.push(0);
         self.problem.friction.clear();
@@ -68,7 +74,13 @@ impl ContactSystem {
     }
 
     /// Assembles W for the current frames and scalings of the bodies.
-    pub fn assemble(&mut self, bodies: &[BodyProblem], factors: &[&SystemFactor], partners: &[Partner], h: f64) {
+    pub fn assemble(
+        &mut self,
+        bodies: &[BodyProblem],
+        factors: &[&SystemFactor],
+        partners: &[Partner],
+        h: f64,
+    ) {
         let m = self.problem.rows();
         let mut W = std::mem::take(&mut self.problem.W);
         W.clear();
@@ -215,13 +227,7 @@ impl ContactSystem {
 }
 
 /// What to add to the motion along the normal so that zero is the goal.
-fn goal(
-    row: &Row,
-    bodies: &[BodyProblem],
-    partners: &[Partner],
-    h: f64,
-    limits: &ContactLimits,
-) -> f64 {
+fn goal(row: &Row, bodies: &[BodyProblem], partners: &[Partner], h: f64, limits: &ContactLimits) -> f64 {
     let velocity = |side: &Side| match side {
         Side::Soft { body, .. } => side.interpolate(&bodies[*body].v_start),
         Side::Partner { partner, point } => partners[partner.0 as usize].velocity(point, h),

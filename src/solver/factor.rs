@@ -6,8 +6,7 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
-    factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, MatRef, Par, Side, Spec};
@@ -52,10 +51,7 @@ impl Symbolic {
             SymmetricOrdering::Identity,
             CholeskySymbolicParams::default(),
         );
-        Some(Self {
-            pattern,
-            cholesky: cholesky.ok()?,
-        })
+        Some(Self { pattern, cholesky: cholesky.ok()? })
     }
 
     pub fn column_starts(&self) -> &[usize] {
@@ -78,9 +74,7 @@ impl Symbolic {
         scratch: &mut FactorScratch,
     ) -> Result<Factor, NotPositiveDefinite> {
         let A = SparseColMatRef::new(self.pattern.as_ref(), values);
-        let need = self
-            .cholesky
-            .factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
+        let need = self.cholesky.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
         let mut factor = vec![0.0; self.cholesky.len_val()];
         self.cholesky
             .factorize_numeric_llt(

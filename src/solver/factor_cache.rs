@@ -50,7 +50,9 @@ impl FactorCache {
         self.symbolic.retain(|(model, _), _| models.contains(model));
         while self.column_bytes() > column_budget {
             let idle = |f: &&mut SystemFactor| f.columns.bytes() > 0;
-            let Some(oldest) = self.factors.values_mut().filter(idle).min_by_key(|f| (f.last_used, f.model.id)) else {
+            let Some(oldest) =
+                self.factors.values_mut().filter(idle).min_by_key(|f| (f.last_used, f.model.id))
+            else {
                 return;
             };
             oldest.columns.clear();

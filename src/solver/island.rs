@@ -73,9 +73,8 @@ impl Island {
             self.report.iterations += 1;
             let last = iteration == iterations;
             let outcome = self.iterate(&factors, partners, h, limits, last);
-            let converged = |b: &BodyProblem| {
-                b.residual() <= b.settings.tolerance.max(ROUNDING) * b.force_scale()
-            };
+            let converged =
+                |b: &BodyProblem| b.residual() <= b.settings.tolerance.max(ROUNDING) * b.force_scale();
             let done = match outcome {
                 Outcome::Stalled => true,
                 Outcome::Turned => false,
@@ -159,7 +158,13 @@ impl Island {
         outcome
     }
 
-    fn solve_contacts(&mut self, factors: &[&SystemFactor], partners: &[Partner], h: f64, limits: &ContactLimits) {
+    fn solve_contacts(
+        &mut self,
+        factors: &[&SystemFactor],
+        partners: &[Partner],
+        h: f64,
+        limits: &ContactLimits,
+    ) {
         let heaviest = self.bodies.iter().map(|b| b.weight).fold(0.0, f64::max);
         let tolerance = ConeTolerance {
             relative: limits.tolerance,

@@ -50,7 +50,8 @@ impl Lbfgs {
 
     /// Takes in the step from the current iterate to the trial.
     pub fn learn(&mut self, body: &BodyProblem) {
-        let difference = |a: &[Vec3], b: &[Vec3]| -> Vec<Vec3> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
+        let difference =
+            |a: &[Vec3], b: &[Vec3]| -> Vec<Vec3> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
         let moved = difference(&body.trial.x, &body.current.x);
         let mut force = difference(&body.current.r, &body.trial.r);
         body.key.pins.iter().for_each(|&p| force[p as usize] = Vec3::zeros());
@@ -60,11 +61,7 @@ impl Lbfgs {
             if self.pairs.len() == self.window {
                 self.pairs.pop_front();
             }
-            self.pairs.push_back(Pair {
-                moved,
-                force,
-                inverse_curvature: 1.0 / curvature,
-            });
+            self.pairs.push_back(Pair { moved, force, inverse_curvature: 1.0 / curvature });
         }
     }
 }

@@ -201,8 +201,8 @@ impl Metric {
         if !d.active {
             return block;
         }
-        let rigid = d.mean / (d.total_mass * d.total_mass)
-            + Mat3::from_diagonal_element(d.mobility / d.total_mass);
+        let rigid =
+            d.mean / (d.total_mass * d.total_mass) + Mat3::from_diagonal_element(d.mobility / d.total_mass);
         block - (d.coupling[i] + d.coupling[j].transpose()) / d.total_mass + rigid
     }
 

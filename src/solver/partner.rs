@@ -38,12 +38,9 @@ impl Partner {
     pub fn free_displacement(&self, p: &Vec3, h: f64) -> Vec3 {
         match self {
             Self::Prescribed { start, end } => end.transform(&start.inverse_transform(p)) - p,
-            Self::Rigid {
-                com,
-                free_linvel,
-                free_angvel,
-                ..
-            } => (free_linvel + free_angvel.cross(&(p - com))) * h,
+            Self::Rigid { com, free_linvel, free_angvel, .. } => {
+                (free_linvel + free_angvel.cross(&(p - com))) * h
+            }
         }
     }
 
@@ -62,12 +59,7 @@ impl Partner {
     pub fn velocity(&self, p: &Vec3, h: f64) -> Vec3 {
         match self {
             Self::Prescribed { .. } => self.free_displacement(p, h) / h,
-            Self::Rigid {
-                com,
-                linvel,
-                angvel,
-                ..
-            } => linvel + angvel.cross(&(p - com)),
+            Self::Rigid { com, linvel, angvel, .. } => linvel + angvel.cross(&(p - com)),
         }
     }
 
@@ -75,12 +67,7 @@ impl Partner {
     pub fn compliance(&self, p: &Vec3, a: &Vec3, q: &Vec3, b: &Vec3, h: f64) -> f64 {
         match self {
             Self::Prescribed { .. } => 0.0,
-            Self::Rigid {
-                com,
-                inv_mass,
-                inv_inertia,
-                ..
-            } => {
+            Self::Rigid { com, inv_mass, inv_inertia, .. } => {
                 let linear = a.dot(&inv_mass.component_mul(b));
                 let (arm_a, arm_b) = ((p - com).cross(a), (q - com).cross(b));
                 h * h * (linear + arm_a.dot(&(inv_inertia * arm_b)))

@@ -16,7 +16,8 @@ use proptest::prelude::*;
 use rapier3d::math::Vector;
 
 const H: f64 = 1.0 / 60.0;
-const LIMITS: ContactLimits = ContactLimits { recovery_speed: 1.0, restitution_threshold: 0.5, tolerance: 1e-12 };
+const LIMITS: ContactLimits =
+    ContactLimits { recovery_speed: 1.0, restitution_threshold: 0.5, tolerance: 1e-12 };
 
 fn body(system: SystemMatrix, frames: Frames, pinned: bool) -> DeformableBody {
     let settings = SolverSettings { system, frames, ..SolverSettings::iterations(1) };
@@ -70,7 +71,8 @@ fn contact_set_elimination_is_the_surface_block_solve() {
     cache.prepare(&key, &body, H, 0..surface.nodes.len() as u32).unwrap();
     let factor = cache.get(&key).unwrap();
     let contact: Vec<usize> = (0..surface.nodes.len()).step_by(3).collect();
-    let dofs: Vec<usize> = contact.iter().flat_map(|&s| (0..3).map(move |c| 3 * surface.nodes[s] as usize + c)).collect();
+    let dofs: Vec<usize> =
+        contact.iter().flat_map(|&s| (0..3).map(move |c| 3 * surface.nodes[s] as usize + c)).collect();
     let b = DVector::from_fn(n, |i, _| ((i * 37 % 101) as f64 - 50.0) * 10.0);
     let goal = DVector::from_fn(dofs.len(), |i, _| ((i * 13 % 17) as f64 - 8.0) * 1e-3);
     // The partition, densely.
@@ -140,7 +142,8 @@ fn translation_is_exact_in_every_metric() {
         let factor = cache.get(&problem.key).unwrap();
         // Weights move every node by h² g.
         let density = 1000.0;
-        let weight: Vec<Vec3> = problem.model.node_volumes.iter().map(|v| Vec3::y() * (v * density)).collect();
+        let weight: Vec<Vec3> =
+            problem.model.node_volumes.iter().map(|v| Vec3::y() * (v * density)).collect();
         for moved in problem.preconditioned(&weight, factor) {
             assert!((moved - Vec3::y() * (H * H)).norm() < 1e-12 * H * H, "{system:?} {frames:?}");
         }
@@ -161,12 +164,12 @@ fn random_problem(contacts: usize, rank: usize, mu: f64, numbers: &[f64]) -> Con
     let wish = DVector::from_fn(m, |i, _| at(i * 5 + 3));
     let mut g = -&W * wish;
     (0..contacts).for_each(|i| g[3 * i] += 0.1 * at(i).abs());
-    let mut problem = ConeProblem::default();
-    problem.offsets = (0..=contacts).map(|i| 3 * i).collect();
-    problem.friction = vec![mu; contacts];
-    problem.W = W.as_slice().to_vec();
-    problem.g = g.as_slice().to_vec();
-    problem
+    ConeProblem {
+        offsets: (0..=contacts).map(|i| 3 * i).collect(),
+        friction: vec![mu; contacts],
+        W: W.as_slice().to_vec(),
+        g: g.as_slice().to_vec(),
+    }
 }
 
 fn objective(problem: &ConeProblem, lambda: &[f64]) -> f64 {
@@ -222,12 +225,20 @@ proptest! {
 fn touching() -> (FactorCache, Island) {
     let (cache, problem) = prepared(SystemMatrix::RestStiffness, Frames::PerNode, false);
     let mut island = Island::default();
-    let nodes: Vec<u32> = problem.model.surface.nodes.iter().copied().filter(|&n| problem.model.rest[n as usize].y < -0.19).collect();
+    let nodes: Vec<u32> = problem
+        .model
+        .surface
+        .nodes
+        .iter()
+        .copied()
+        .filter(|&n| problem.model.rest[n as usize].y < -0.19)
+        .collect();
     for n in nodes {
         let x = problem.x_start[n as usize];
         let soft = Side::Soft { body: 0, nodes: [n, 0, 0], weights: [1.0, 0.0, 0.0] };
         let key = ContactKey { obstacle: 0, part: 0, feature: n, slot: 0 };
-        let mut row = Row::new([soft, Side::Partner { partner: PartnerId(0), point: x }], Vec3::y(), 0.0, key);
+        let mut row =
+            Row::new([soft, Side::Partner { partner: PartnerId(0), point: x }], Vec3::y(), 0.0, key);
         row.friction = 0.4;
         island.contacts.rows.push(row);
     }
@@ -279,7 +290,11 @@ fn solved_contacts_obey_signorini_and_coulomb() {
         let gap = contacts.final_gap(i);
         // Lengths are of 1e-3 m over a step; the regularisation (ε = 1e-4) and the lagging shift of
         // slipping rows leave less than 1e-4 of that.
-        assert!(gap > -1e-7 && l[0] >= 0.0 && l[1].hypot(l[2]) <= row.friction * l[0] * (1.0 + 1e-9), "{gap:e} {l:?} after {} it.", island.report.iterations);
+        assert!(
+            gap > -1e-7 && l[0] >= 0.0 && l[1].hypot(l[2]) <= row.friction * l[0] * (1.0 + 1e-9),
+            "{gap:e} {l:?} after {} it.",
+            island.report.iterations
+        );
         // What carries is closed, but for the part of its slip by which the shift lags.
         let slack = 1e-7 + 0.05 * contacts.shift[i];
         assert!(l[0] == 0.0 || gap < slack, "carries {} N at {gap:e} m, slack {slack:e}", l[0]);

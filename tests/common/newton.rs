@@ -27,7 +27,15 @@ pub struct StaticProblem {
 impl StaticProblem {
     /// A mesh of Young's modulus `e` [Pa], Poisson's ratio `nu`, density `rho` [kg/m³] under gravity
     /// `g` [m/s²] along −y, with fixed nodes.
-    pub fn new(rest: &[[f64; 3]], tets: &[[u32; 4]], e: f64, nu: f64, rho: f64, g: f64, fixed: impl Fn([f64; 3]) -> bool) -> Self {
+    pub fn new(
+        rest: &[[f64; 3]],
+        tets: &[[u32; 4]],
+        e: f64,
+        nu: f64,
+        rho: f64,
+        g: f64,
+        fixed: impl Fn([f64; 3]) -> bool,
+    ) -> Self {
         let mut masses = vec![0.0; rest.len()];
         let elements = tets
             .iter()
@@ -86,7 +94,9 @@ impl StaticProblem {
             let axl = V::new(B[(2, 1)] - B[(1, 2)], B[(0, 2)] - B[(2, 0)], B[(1, 0)] - B[(0, 1)]);
             let omega = (M::identity() * S.trace() - S).try_inverse().unwrap_or_else(M::zeros) * axl;
             let dR = R * omega.cross_matrix();
-            let dP = (dF - dR) * (2.0 * self.mu) + R * (self.lambda * R.dot(&dF)) + dR * (self.lambda * (S.trace() - 3.0));
+            let dP = (dF - dR) * (2.0 * self.mu)
+                + R * (self.lambda * R.dot(&dF))
+                + dR * (self.lambda * (S.trace() - 3.0));
             (0..4).for_each(|a| out[e.nodes[a]] += dP * e.gradients[a] * e.volume);
         }
         (0..out.len()).filter(|&i| self.fixed[i]).for_each(|i| out[i] = V::zeros());
