@@ -38,7 +38,7 @@ pub enum DeformableBodyError {
     /// A bad time step.
     #[error("time step {dt} s is not positive and finite")]
     TimeStep {
-        /// The step asked for [s].
+        /// The step asked for \[s\].
         dt: f64,
     },
 }

@@ -65,3 +65,8 @@ pub mod prelude {
         SystemMatrix, TetMesh,
     };
 }
+
+/// The examples of the README compile and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -28,7 +28,7 @@ pub struct MaterialError {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeformableMaterial {
-    /// Young's modulus [Pa].
+    /// Young's modulus \[Pa\].
     pub youngs_modulus: f64,
     /// Poisson's ratio [–], 0 up to but without 0.5.
     pub poisson_ratio: f64,
@@ -40,14 +40,14 @@ pub struct DeformableMaterial {
     pub restitution: f64,
     /// Mass-proportional (Rayleigh) damping α [1/s]: a drag `−α m v` on every node.
     pub mass_damping: f64,
-    /// Stiffness-proportional damping β [s]: stress `β` times the co-rotated strain rate times the
+    /// Stiffness-proportional damping β \[s\]: stress `β` times the co-rotated strain rate times the
     /// stiffness. Rotation is not damped.
     pub stiffness_damping: f64,
     /// The elastic energy.
     pub elasticity: Elasticity,
 }
 
-/// Lamé parameters μ, λ [Pa].
+/// Lamé parameters μ, λ \[Pa\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Lame {
     pub mu: f64,
@@ -55,7 +55,7 @@ pub(crate) struct Lame {
 }
 
 impl DeformableMaterial {
-    /// A material of Young's modulus `youngs_modulus` [Pa] and Poisson's ratio `poisson_ratio`; the
+    /// A material of Young's modulus `youngs_modulus` \[Pa\] and Poisson's ratio `poisson_ratio`; the
     /// density is that of water, friction 0.5, no restitution and no damping.
     pub fn new(youngs_modulus: f64, poisson_ratio: f64) -> Self {
         Self {
@@ -94,7 +94,7 @@ impl DeformableMaterial {
         self
     }
 
-    /// Sets the stiffness-proportional damping β [s].
+    /// Sets the stiffness-proportional damping β \[s\].
     pub fn stiffness_damping(mut self, beta: f64) -> Self {
         self.stiffness_damping = beta;
         self

@@ -52,7 +52,7 @@ pub enum BodyError {
 pub struct Pin {
     pub(crate) node: u32,
     pub(crate) target: Vec3,
-    /// Force that holds the vertex [N], of the last step.
+    /// Force that holds the vertex \[N\], of the last step.
     pub(crate) force: Vec3,
 }
 
@@ -75,7 +75,7 @@ pub struct DeformableBody {
     pub(crate) material: DeformableMaterial,
     /// Ascending by node.
     pub(crate) pins: Vec<Pin>,
-    /// External force on every node [N]; empty while there is none.
+    /// External force on every node \[N\]; empty while there is none.
     pub(crate) forces: Vec<Vec3>,
     pub(crate) report: StepReport,
     settings: SolverSettings,
@@ -144,12 +144,12 @@ impl DeformableBody {
         self.model.vertex_count()
     }
 
-    /// Positions of the vertices [m], rounded to rapier's precision.
+    /// Positions of the vertices \[m\], rounded to rapier's precision.
     pub fn positions(&self) -> impl ExactSizeIterator<Item = Vector> + '_ {
         self.model.nodes_by_vertex().map(|n| to_real(&self.state.x[n]))
     }
 
-    /// Position of a vertex [m] in the solver's precision.
+    /// Position of a vertex \[m\] in the solver's precision.
     ///
     /// # Errors
     /// [`BodyError::NoSuchVertex`].
@@ -165,30 +165,30 @@ impl DeformableBody {
         Ok(self.state.v[self.node(vertex)?].into())
     }
 
-    /// Vertices whose position [m] satisfies a condition, ascending.
+    /// Vertices whose position \[m\] satisfies a condition, ascending.
     pub fn vertices_where(&self, mut condition: impl FnMut(Vector) -> bool) -> Vec<usize> {
         let vertices = self.positions().enumerate();
         vertices.filter(|(_, p)| condition(*p)).map(|(i, _)| i).collect()
     }
 
-    /// Bounding box [m].
+    /// Bounding box \[m\].
     pub fn aabb(&self) -> Aabb {
         Aabb::from_points(self.state.x.iter().map(to_real))
     }
 
-    /// Current volume [m³].
+    /// Current volume \[m³\].
     pub fn volume(&self) -> f64 {
         elastic::volume(&self.model, &self.state.x)
     }
 
     // ── Mass and motion ─────────────────────────────────────────────────
 
-    /// Mass [kg].
+    /// Mass \[kg\].
     pub fn mass(&self) -> f64 {
         self.material.density * self.model.volume
     }
 
-    /// Centre of mass [m].
+    /// Centre of mass \[m\].
     pub fn center_of_mass(&self) -> [f64; 3] {
         self.weighted_mean(&self.state.x).into()
     }
@@ -216,13 +216,13 @@ impl DeformableBody {
         self.state.v.iter().map(|v| v.norm()).fold(0.0, f64::max)
     }
 
-    /// Kinetic energy [J].
+    /// Kinetic energy \[J\].
     pub fn kinetic_energy(&self) -> f64 {
         let energy = |(n, v): (usize, &Vec3)| 0.5 * self.node_mass(n) * v.norm_squared();
         self.state.v.iter().enumerate().map(energy).sum()
     }
 
-    /// Elastic energy [J].
+    /// Elastic energy \[J\].
     pub fn elastic_energy(&self) -> f64 {
         let mut unused = vec![Vec3::zeros(); self.state.x.len()];
         let undamped = elastic::StiffnessDamping::default();
@@ -263,7 +263,7 @@ impl DeformableBody {
         Ok(())
     }
 
-    /// Moves one vertex [m] without giving it a velocity.
+    /// Moves one vertex \[m\] without giving it a velocity.
     ///
     /// # Errors
     /// [`BodyError::NoSuchVertex`], [`BodyError::NotFinite`].
@@ -317,7 +317,7 @@ impl DeformableBody {
         Ok(())
     }
 
-    /// Leads a pinned vertex: it reaches `target` [m] at the end of the next step.
+    /// Leads a pinned vertex: it reaches `target` \[m\] at the end of the next step.
     ///
     /// # Errors
     /// [`BodyError::NoSuchVertex`], [`BodyError::NotPinned`], [`BodyError::NotFinite`].
@@ -334,14 +334,14 @@ impl DeformableBody {
         self.pins.iter().map(|p| self.model.vertex(p.node as usize))
     }
 
-    /// Force [N] with which the pins held the body in the last step.
+    /// Force \[N\] with which the pins held the body in the last step.
     pub fn pin_force(&self) -> [f64; 3] {
         self.pins.iter().map(|p| p.force).sum::<Vec3>().into()
     }
 
     // ── Forces ──────────────────────────────────────────────────────────
 
-    /// Adds a force [N], shared equally by the vertices. Like rapier's, it persists until
+    /// Adds a force \[N\], shared equally by the vertices. Like rapier's, it persists until
     /// [`DeformableBody::reset_forces`].
     ///
     /// # Errors
@@ -484,7 +484,7 @@ impl DeformableBody {
         self.report.iterations
     }
 
-    /// Largest residual force on a node after the last step [N].
+    /// Largest residual force on a node after the last step \[N\].
     pub fn last_residual(&self) -> f64 {
         self.report.residual
     }

@@ -47,12 +47,12 @@ pub struct DeformableBodyBuilder {
 type Condition = Arc<dyn Fn(Vector) -> bool + Send + Sync>;
 
 impl DeformableBodyBuilder {
-    /// A cuboid of these half extents [m], cut into cells of five tetrahedra each.
+    /// A cuboid of these half extents \[m\], cut into cells of five tetrahedra each.
     pub fn cuboid(half_extents: Vector, cells: [usize; 3]) -> Self {
         Self::from_mesh(TetMesh::cuboid(half_extents.to_array().map(f64::from), cells))
     }
 
-    /// A parry shape filled with tetrahedra of about `cell_size` [m], see [`TetMesh::fill_shape`].
+    /// A parry shape filled with tetrahedra of about `cell_size` \[m\], see [`TetMesh::fill_shape`].
     pub fn filled(shape: &dyn Shape, cell_size: f32) -> Self {
         Self::from_mesh(TetMesh::fill_shape(shape, cell_size))
     }
@@ -107,13 +107,13 @@ impl DeformableBodyBuilder {
         self
     }
 
-    /// Sets the translation [m] of the rest mesh into the world.
+    /// Sets the translation \[m\] of the rest mesh into the world.
     pub fn translation(mut self, translation: Vector) -> Self {
         self.pose.translation = translation;
         self
     }
 
-    /// Sets the rotation of the rest mesh into the world, as axis times angle [rad].
+    /// Sets the rotation of the rest mesh into the world, as axis times angle \[rad\].
     pub fn rotation(mut self, angle: Vector) -> Self {
         self.pose.rotation = Rotation::from_scaled_axis(angle);
         self

@@ -23,7 +23,7 @@ pub(crate) struct StiffnessDamping {
 }
 
 impl StiffnessDamping {
-    /// Takes the stretches at `x`; `beta` [s], `h` [s].
+    /// Takes the stretches at `x`; `beta` \[s\], `h` \[s\].
     pub fn begin(&mut self, model: &DeformableModel, beta: f64, h: f64, x: &[Vec3]) {
         self.ratio = beta / h;
         self.stretches.clear();
@@ -38,7 +38,7 @@ impl StiffnessDamping {
     }
 }
 
-/// Adds the elastic (and damping) forces [N] at positions `x` to `force` and returns the energy [J].
+/// Adds the elastic (and damping) forces \[N\] at positions `x` to `force` and returns the energy \[J\].
 pub(crate) fn add_forces(
     model: &DeformableModel,
     material: &DeformableMaterial,
@@ -193,7 +193,7 @@ pub(crate) fn floating_frame(model: &DeformableModel, x: &[Vec3]) -> (Mat3, Vec3
     (polar_rotation(&moment), c0, c)
 }
 
-/// Volume of the body at `x` [m³].
+/// Volume of the body at `x` \[m³\].
 pub(crate) fn volume(model: &DeformableModel, x: &[Vec3]) -> f64 {
     let signed = |t: &[u32; 4]| crate::mesh::signed_volume(&t.map(|n| x[n as usize]));
     model.tetrahedra.iter().map(signed).sum()

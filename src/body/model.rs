@@ -11,21 +11,21 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct DeformableModel {
     /// Names the model in caches.
     pub(crate) id: u64,
-    /// Rest positions [m].
+    /// Rest positions \[m\].
     pub(crate) rest: Vec<Vec3>,
     /// Nodes of each tetrahedron, in the order of `blocks`.
     pub(crate) tetrahedra: Vec<[u32; 4]>,
     /// The tetrahedra again, four at a time, as the element loops want them.
     pub(crate) blocks: Vec<ElementBlock>,
-    /// A quarter of the volume of the tetrahedra around each node [m³].
+    /// A quarter of the volume of the tetrahedra around each node \[m³\].
     pub(crate) node_volumes: Vec<f64>,
     /// Nodes that share a tetrahedron with each node, ascending, itself left out.
     pub(crate) adjacency: Vec<Vec<u32>>,
     /// The boundary.
     pub(crate) surface: Surface,
-    /// Extent of the rest shape: diagonal of its bounding box [m].
+    /// Extent of the rest shape: diagonal of its bounding box \[m\].
     pub(crate) size: f64,
-    /// Volume at rest [m³].
+    /// Volume at rest \[m³\].
     pub(crate) volume: f64,
     node_of_vertex: Vec<u32>,
     vertex_of_node: Vec<u32>,
@@ -39,7 +39,7 @@ pub(crate) struct ElementBlock {
     /// `gradients[a]`: gradient of the shape function of corner a + 1 [1/m]; corner 0 has minus
     /// their sum. `F = Σ (x_a − x_0) gradients[a]ᵀ`.
     pub gradients: [[Lane; 3]; 3],
-    /// Rest volumes [m³]; zero in the lanes that fill up the last block.
+    /// Rest volumes \[m³\]; zero in the lanes that fill up the last block.
     pub volumes: Lane,
 }
 
@@ -93,7 +93,7 @@ impl DeformableModel {
         self.tetrahedra.len()
     }
 
-    /// Rest position of a vertex [m].
+    /// Rest position of a vertex \[m\].
     ///
     /// # Panics
     /// If there is no such vertex.
@@ -101,7 +101,7 @@ impl DeformableModel {
         self.rest[self.node_of_vertex[vertex] as usize].into()
     }
 
-    /// Volume at rest [m³].
+    /// Volume at rest \[m³\].
     pub fn volume(&self) -> f64 {
         self.volume
     }

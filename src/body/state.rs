@@ -5,7 +5,7 @@ use crate::math::Vec3;
 /// All that a snapshot of a body has to hold. A body restored from it goes on with the same bits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeformableState {
-    /// Node positions [m].
+    /// Node positions \[m\].
     pub(crate) x: Vec<Vec3>,
     /// Node velocities [m/s].
     pub(crate) v: Vec<Vec3>,
@@ -31,9 +31,9 @@ pub(crate) struct ContactKey {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ContactMemory {
     pub key: ContactKey,
-    /// Force on the body [N], in the world.
+    /// Force on the body \[N\], in the world.
     pub force: Vec3,
-    /// De Saxcé shift μ‖slip‖ [m] over the step, per second of it [m/s].
+    /// De Saxcé shift μ‖slip‖ \[m\] over the step, per second of it [m/s].
     pub shift_rate: f64,
     /// Where on the body: nodes and their weights.
     pub nodes: [u32; 3],

@@ -52,7 +52,7 @@ struct Scene<'a> {
     model: &'a DeformableModel,
     extent: Aabb,
     scales: Scales,
-    /// Largest motion of the obstacle near the body [m].
+    /// Largest motion of the obstacle near the body \[m\].
     motion: f64,
 }
 

@@ -31,7 +31,7 @@ pub(crate) enum Solidity {
 }
 
 impl Obstacle {
-    /// Displacement over the step [m] of the obstacle's material point that is at `p` at its start.
+    /// Displacement over the step \[m\] of the obstacle's material point that is at `p` at its start.
     pub fn displacement(&self, p: &Vec3) -> Vec3 {
         self.end.transform(&self.start.inverse_transform(p)) - p
     }

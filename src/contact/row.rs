@@ -15,7 +15,7 @@ pub(crate) enum Side {
         /// Sum to one; zero for nodes that do not count.
         weights: [f64; 3],
     },
-    /// A point of a rigid body, at the start of the step [m].
+    /// A point of a rigid body, at the start of the step \[m\].
     Partner { partner: PartnerId, point: Vec3 },
 }
 
@@ -25,12 +25,12 @@ pub(crate) struct Row {
     pub sides: [Side; 2],
     /// Normal, from side 1 to side 0, and two tangents.
     pub frame: [Vec3; 3],
-    /// Distance along the normal at the start of the step [m].
+    /// Distance along the normal at the start of the step \[m\].
     pub gap: f64,
     pub friction: f64,
     pub restitution: f64,
     pub key: ContactKey,
-    /// Force on side 0 in the last step [N].
+    /// Force on side 0 in the last step \[N\].
     pub warm_force: Vec3,
     /// De Saxcé shift of the last step, per second of it [m/s].
     pub warm_shift_rate: f64,
@@ -61,7 +61,7 @@ impl Row {
         &self.frame[..self.dimension()]
     }
 
-    /// The force in the world of the components `lambda` [N].
+    /// The force in the world of the components `lambda` \[N\].
     pub fn force(&self, lambda: &[f64]) -> Vec3 {
         let terms = self.directions().iter().zip(lambda);
         terms.fold(Vec3::zeros(), |sum, (d, l)| sum + d * *l)

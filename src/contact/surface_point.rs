@@ -16,7 +16,7 @@ pub(crate) struct SurfacePoint {
     pub point: Vec3,
     /// Outward.
     pub normal: Vec3,
-    /// Signed distance along the normal [m].
+    /// Signed distance along the normal \[m\].
     pub gap: f64,
     /// The normal is that of a plane face, exact.
     pub flat: bool,
@@ -25,9 +25,9 @@ pub(crate) struct SurfacePoint {
 /// Lengths that decide which of the normals is used.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scales {
-    /// Nearer than this to the surface a projection's direction is noise [m].
+    /// Nearer than this to the surface a projection's direction is noise \[m\].
     pub band: f64,
-    /// Shift back into the body for the second projection [m].
+    /// Shift back into the body for the second projection \[m\].
     pub shift: f64,
 }
 

@@ -27,7 +27,7 @@ const FACING: f64 = -0.05;
 const PARALLEL: f64 = 0.9;
 
 /// The contact of the obstacle with the inside or an edge of a triangle; `None` where there is none
-/// within `reach` [m], or the rows that the triangle has already (`known`) say it: among parallel
+/// within `reach` \[m\], or the rows that the triangle has already (`known`) say it: among parallel
 /// surfaces the closest points are any points, and would be others in every step.
 pub(crate) fn triangle_point<'a>(
     obstacle: &Obstacle,

@@ -30,7 +30,7 @@ pub(crate) struct RapierScene {
 }
 
 impl RapierScene {
-    /// Reads all enabled solid colliders, as they will move over the next `dt` [s].
+    /// Reads all enabled solid colliders, as they will move over the next `dt` \[s\].
     pub fn read(&mut self, sets: RapierSets<'_>, gravity: Vector, dt: f64) {
         self.obstacles.clear();
         self.partners.clear();

@@ -27,7 +27,7 @@ struct Replaced {
 }
 
 impl Reactions {
-    /// Hands over the reactions of a step of `dt` [s]. `handles[i]` is the body of `reactions[i]`.
+    /// Hands over the reactions of a step of `dt` \[s\]. `handles[i]` is the body of `reactions[i]`.
     pub fn write(
         &mut self,
         bodies: &mut RigidBodySet,

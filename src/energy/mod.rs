@@ -30,7 +30,7 @@ pub enum Elasticity {
 pub(crate) struct Response {
     /// Energy per rest volume [J/m³].
     pub density: Lane,
-    /// First Piola–Kirchhoff stress `∂density/∂F` [Pa].
+    /// First Piola–Kirchhoff stress `∂density/∂F` \[Pa\].
     pub stress: LaneMat3,
     /// Rotation of the polar decomposition.
     pub rotation: LaneMat3,
@@ -41,7 +41,7 @@ pub(crate) trait ElementEnergy: Copy + Send + Sync {
     /// Density, stress and rotation at the deformation gradients `F`.
     fn evaluate(&self, F: &LaneMat3) -> Response;
 
-    /// Weight w [Pa] of the element's Laplacian in the Projective Dynamics matrix
+    /// Weight w \[Pa\] of the element's Laplacian in the Projective Dynamics matrix
     /// `M/h² + Σ w V GᵀG`: an upper bound of the energy's curvature.
     fn laplacian_weight(&self) -> f64;
 }

@@ -70,7 +70,7 @@ impl Pose64 {
     }
 }
 
-/// The rotation by the vector `w` [rad] (Rodrigues).
+/// The rotation by the vector `w` \[rad\] (Rodrigues).
 pub(crate) fn rotation_from_vector(w: &Vec3) -> Mat3 {
     nalgebra::Rotation3::new(*w).into_inner()
 }

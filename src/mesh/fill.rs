@@ -19,7 +19,7 @@ const KEPT: f32 = 0.98;
 const MAX_CELLS: f32 = 256.0;
 
 impl TetMesh {
-    /// Fills a closed, outward-wound triangle surface with tetrahedra of about `cell_size` [m]
+    /// Fills a closed, outward-wound triangle surface with tetrahedra of about `cell_size` \[m\]
     /// (parry's lattice cover, pulled towards the surface). The result contains the surface, so it
     /// is larger than the shape by a fraction of a cell.
     ///
@@ -69,7 +69,7 @@ impl TetMesh {
         TetMesh::new(points, filled.cells)
     }
 
-    /// Fills one of parry's shapes with tetrahedra of about `cell_size` [m].
+    /// Fills one of parry's shapes with tetrahedra of about `cell_size` \[m\].
     ///
     /// # Errors
     /// [`MeshError::NotFillable`] for shapes without a closed surface (half-spaces, heightfields,

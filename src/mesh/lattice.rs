@@ -15,7 +15,7 @@ const EVEN_CELL: [[usize; 4]; 5] = [
 ];
 
 impl TetMesh {
-    /// A cuboid centred at the origin, `half_extents` [m], cut into `cells` per axis, each cell into
+    /// A cuboid centred at the origin, `half_extents` \[m\], cut into `cells` per axis, each cell into
     /// five tetrahedra whose diagonals alternate with the cell's parity.
     ///
     /// # Errors

@@ -21,7 +21,7 @@ pub(crate) struct Surface {
     pub edge_triangles: Vec<[u32; 2]>,
     /// Index into `nodes` per mesh node; `u32::MAX` inside the body.
     pub index_of_node: Vec<u32>,
-    /// Mean length of the edges at rest [m].
+    /// Mean length of the edges at rest \[m\].
     pub mean_edge: f64,
 }
 

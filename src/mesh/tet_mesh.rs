@@ -20,7 +20,7 @@ pub enum MeshError {
     NotFinite {
         /// Index of the vertex.
         vertex: usize,
-        /// Its position [m].
+        /// Its position \[m\].
         position: [f64; 3],
     },
     /// An index points outside the vertex list.
@@ -46,7 +46,7 @@ pub enum MeshError {
     Inverted {
         /// Index of the tetrahedron.
         tet: usize,
-        /// Its signed volume [m³].
+        /// Its signed volume \[m³\].
         volume: f64,
     },
     /// No volume to speak of.
@@ -54,9 +54,9 @@ pub enum MeshError {
     Flat {
         /// Index of the tetrahedron.
         tet: usize,
-        /// Its volume [m³].
+        /// Its volume \[m³\].
         volume: f64,
-        /// Its longest edge [m].
+        /// Its longest edge \[m\].
         edge: f64,
     },
     /// A vertex that no tetrahedron uses has no mass.
@@ -86,7 +86,7 @@ pub enum MeshError {
     BadLattice {
         /// Requested cells per axis.
         cells: [usize; 3],
-        /// Requested half extents [m].
+        /// Requested half extents \[m\].
         half_extents: [f64; 3],
     },
     /// More vertices than 32-bit indices can name.
@@ -98,9 +98,9 @@ pub enum MeshError {
     /// A cell size that is not a positive number, or so small that the fill would not fit memory.
     #[error("cell size {cell_size} m does not fill a shape of extents {extents:?} m")]
     BadCellSize {
-        /// Requested cell size [m].
+        /// Requested cell size \[m\].
         cell_size: f32,
-        /// Extents of the shape's bounding box [m].
+        /// Extents of the shape's bounding box \[m\].
         extents: [f32; 3],
     },
     /// The surface encloses nothing that could be filled.
@@ -108,7 +108,7 @@ pub enum MeshError {
     NothingEnclosed {
         /// Triangles of the surface.
         triangles: usize,
-        /// Requested cell size [m].
+        /// Requested cell size \[m\].
         cell_size: f32,
     },
     /// A shape without a closed surface.
@@ -171,7 +171,7 @@ impl TetMesh {
         Ok(Self { vertices, tetrahedra, volumes })
     }
 
-    /// Rest positions [m], one per vertex.
+    /// Rest positions \[m\], one per vertex.
     pub fn vertices(&self) -> &[[f64; 3]] {
         &self.vertices
     }
@@ -181,12 +181,12 @@ impl TetMesh {
         &self.tetrahedra
     }
 
-    /// Volume of each tetrahedron [m³].
+    /// Volume of each tetrahedron \[m³\].
     pub fn volumes(&self) -> &[f64] {
         &self.volumes
     }
 
-    /// Volume of the mesh [m³].
+    /// Volume of the mesh \[m³\].
     pub fn volume(&self) -> f64 {
         self.volumes.iter().sum()
     }
@@ -219,7 +219,7 @@ fn check_volume(tet: usize, p: [Vec3; 4]) -> Result<f64, MeshError> {
     Ok(volume)
 }
 
-/// Signed volume of a tetrahedron [m³].
+/// Signed volume of a tetrahedron \[m³\].
 pub(crate) fn signed_volume(p: &[Vec3; 4]) -> f64 {
     (p[1] - p[0]).cross(&(p[2] - p[0])).dot(&(p[3] - p[0])) / 6.0
 }

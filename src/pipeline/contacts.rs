@@ -11,12 +11,12 @@ pub struct DeformableContact {
     pub body: DeformableBodyHandle,
     /// The collider.
     pub collider: ColliderHandle,
-    /// Point on the collider at the start of the step [m].
+    /// Point on the collider at the start of the step \[m\].
     pub point: Vector,
     /// Unit normal, from the collider to the body.
     pub normal: Vector,
-    /// Force on the body [N]; the collider got the opposite.
+    /// Force on the body \[N\]; the collider got the opposite.
     pub force: Vector,
-    /// Distance along the normal at the end of the step [m]; negative is penetration.
+    /// Distance along the normal at the end of the step \[m\]; negative is penetration.
     pub gap: f64,
 }

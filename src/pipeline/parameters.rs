@@ -13,7 +13,7 @@ pub struct DeformableParameters {
     pub max_corrective_velocity: f64,
     /// New contacts that approach below this speed [m/s] do not bounce.
     pub restitution_threshold: f64,
-    /// Memory [bytes] for columns of inverses, kept between steps for contacts.
+    /// Memory \[bytes\] for columns of inverses, kept between steps for contacts.
     pub column_budget: usize,
 }
 

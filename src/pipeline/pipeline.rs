@@ -46,7 +46,7 @@ impl DeformablePipeline {
         Self::default()
     }
 
-    /// Steps all bodies of `deformables` by `dt` [s] under `gravity` [m/s²] and hands rapier what
+    /// Steps all bodies of `deformables` by `dt` \[s\] under `gravity` [m/s²] and hands rapier what
     /// they do to its bodies. Never fails: a `dt` that is not positive and finite, or a gravity that
     /// is not finite, skips the step ([`DeformableCounters::skipped`]).
     pub fn before_step(

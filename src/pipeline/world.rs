@@ -108,7 +108,7 @@ impl DeformableWorld {
         self.contacts().iter().filter(move |c| c.body == body)
     }
 
-    /// Force [N] of a collider on a body in the last step.
+    /// Force \[N\] of a collider on a body in the last step.
     pub fn contact_force(&self, body: DeformableBodyHandle, collider: ColliderHandle) -> Vector {
         let pair = self.contacts_of(body).filter(|c| c.collider == collider);
         pair.map(|c| c.force).sum()

@@ -2,7 +2,7 @@
 //!
 //! The step minimises `Ψ(x) = 1/(2h²)‖x − s‖²_M + α/(2h)‖x − x_n‖²_M + E(x)`, with
 //! `s = x_n + h v_n + h² M⁻¹ f_ext` [Bouaziz et al. 2014], E the elastic energy with the stiffness
-//! damping of the step. The residual is `r = −∂Ψ/∂x` [N]; pinned nodes are not unknowns.
+//! damping of the step. The residual is `r = −∂Ψ/∂x` \[N\]; pinned nodes are not unknowns.
 
 use super::factor_cache::SystemFactor;
 use super::metric::Metric;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// Largest rotation of an element against the body's frame for which one frame serves.
 const FLOATING_LIMIT: f64 = 20.0 * std::f64::consts::PI / 180.0;
 
-/// Error of the body's frame [rad] beyond which it is refreshed within a step.
+/// Error of the body's frame \[rad\] beyond which it is refreshed within a step.
 const FRAME_ERROR: f64 = 1.0e-4;
 
 /// A body's step in the making.
@@ -35,15 +35,15 @@ pub(crate) struct BodyProblem {
     damping: StiffnessDamping,
     pub current: Iterate,
     pub trial: Iterate,
-    /// Contact forces on the nodes [N].
+    /// Contact forces on the nodes \[N\].
     pub contact_force: Vec<Vec3>,
-    /// What the last contact problem added to them [N].
+    /// What the last contact problem added to them \[N\].
     pub contact_change: Vec<Vec3>,
     pub metric: Metric,
     /// Factor c ≥ 1 on A, raised by the guard.
     pub scaling: f64,
     pub guard_retries: usize,
-    /// A force that counts as large for this body [N].
+    /// A force that counts as large for this body \[N\].
     pub weight: f64,
     step: Vec<Vec3>,
     /// Where the pinned nodes would go by inertia and external forces.
@@ -54,18 +54,18 @@ pub(crate) struct BodyProblem {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Iterate {
     pub x: Vec<Vec3>,
-    /// Residual [N]; at pinned nodes minus the force of the pin.
+    /// Residual \[N\]; at pinned nodes minus the force of the pin.
     pub r: Vec<Vec3>,
-    /// Ψ [J].
+    /// Ψ \[J\].
     pub objective: f64,
-    /// Sum of the sizes of Ψ's terms [J], for its rounding.
+    /// Sum of the sizes of Ψ's terms \[J\], for its rounding.
     pub magnitude: f64,
-    /// Largest internal force on a node [N].
+    /// Largest internal force on a node \[N\].
     pub internal: f64,
 }
 
 impl BodyProblem {
-    /// Takes in a body at the start of a step of `h` [s] under `gravity` [m/s²].
+    /// Takes in a body at the start of a step of `h` \[s\] under `gravity` [m/s²].
     pub fn new(body: &DeformableBody, h: f64, gravity: &Vec3) -> Self {
         let n = body.state.x.len();
         let mut problem = Self {
@@ -185,7 +185,7 @@ impl BodyProblem {
         self.metric.turn_floating(&turned, FRAME_ERROR)
     }
 
-    /// Whether some element has turned by more than `limit` [rad] against the frame.
+    /// Whether some element has turned by more than `limit` \[rad\] against the frame.
     fn bends_beyond(&self, frame: &Mat3, limit: f64) -> bool {
         let least = 1.0 + 2.0 * limit.cos();
         elastic::element_rotations(&self.model, &self.current.x).any(|(_, rotations)| {
@@ -255,7 +255,7 @@ impl BodyProblem {
         }
     }
 
-    /// `r + Jᵀλ⁰`, zero at pinned nodes [N].
+    /// `r + Jᵀλ⁰`, zero at pinned nodes \[N\].
     pub fn free_residual(&self) -> Vec<Vec3> {
         let sums = self.current.r.iter().zip(&self.contact_force).map(|(r, f)| r + f);
         let mut r: Vec<Vec3> = sums.collect();
@@ -263,14 +263,14 @@ impl BodyProblem {
         r
     }
 
-    /// `P f` [m].
+    /// `P f` \[m\].
     pub fn preconditioned(&mut self, f: &[Vec3], factor: &SystemFactor) -> Vec<Vec3> {
         let mut out = vec![Vec3::zeros(); f.len()];
         self.metric.apply(factor, f, &mut out);
         out
     }
 
-    /// Force [N] with which the `k`-th pin holds its node.
+    /// Force \[N\] with which the `k`-th pin holds its node.
     pub fn pin_force(&self, k: usize) -> Vec3 {
         let node = self.key.pins[k] as usize;
         let inertia =
@@ -326,7 +326,7 @@ impl BodyProblem {
         std::mem::swap(&mut self.current, &mut self.trial);
     }
 
-    /// Largest component of `r + Jᵀλ` over the free nodes [N].
+    /// Largest component of `r + Jᵀλ` over the free nodes \[N\].
     pub fn residual(&self) -> f64 {
         let mut largest = 0.0_f64;
         let mut pins = self.key.pins.iter().peekable();
@@ -341,7 +341,7 @@ impl BodyProblem {
         largest
     }
 
-    /// The force that residuals are measured by [N].
+    /// The force that residuals are measured by \[N\].
     pub fn force_scale(&self) -> f64 {
         let contact = self.contact_force.iter().map(|f| f.amax()).fold(0.0, f64::max);
         self.weight.max(self.current.internal).max(contact)

@@ -16,7 +16,7 @@ pub(crate) struct ConeProblem {
     pub friction: Vec<f64>,
     /// Delassus operator [m/N], dense, symmetric.
     pub W: Vec<f64>,
-    /// Gaps and slips without contact forces [m], the shift included in the normal ones.
+    /// Gaps and slips without contact forces \[m\], the shift included in the normal ones.
     pub g: Vec<f64>,
 }
 
@@ -25,7 +25,7 @@ pub(crate) struct ConeProblem {
 pub(crate) struct ConeTolerance {
     /// Of `‖z − γ‖∞` relative to the largest force.
     pub relative: f64,
-    /// The force that counts as large where there is none [N].
+    /// The force that counts as large where there is none \[N\].
     pub floor: f64,
 }
 
@@ -95,7 +95,7 @@ impl ConeProblem {
 }
 
 impl ConeSolver {
-    /// Improves `lambda` [N], which holds the proximal centre and the start, to the solution.
+    /// Improves `lambda` \[N\], which holds the proximal centre and the start, to the solution.
     pub fn solve(&mut self, problem: &ConeProblem, lambda: &mut [f64], tolerance: ConeTolerance) -> ConeWork {
         let mut work = ConeWork::default();
         if problem.contacts() == 0 {

@@ -15,11 +15,11 @@ pub(crate) struct ContactSystem {
     pub rows: Vec<Row>,
     problem: ConeProblem,
     solver: ConeSolver,
-    /// Forces [N], packed as the problem is.
+    /// Forces \[N\], packed as the problem is.
     pub lambda: Vec<f64>,
-    /// De Saxcé shift of each contact [m].
+    /// De Saxcé shift of each contact \[m\].
     pub shift: Vec<f64>,
-    /// What each gap has to reach at the end of the step [m]: restitution and bounded recovery.
+    /// What each gap has to reach at the end of the step \[m\]: restitution and bounded recovery.
     goals: Vec<f64>,
     g_free: Vec<f64>,
     /// W λ.
@@ -49,7 +49,7 @@ impl ContactSystem {
         self.rows.is_empty()
     }
 
-    /// Packs the rows for a step of `h` [s], with their warm starts, which are laid on the nodes.
+    /// Packs the rows for a step of `h` \[s\], with their warm starts, which are laid on the nodes.
     pub fn begin(
         &mut self,
         bodies: &mut [BodyProblem],
@@ -198,12 +198,12 @@ impl ContactSystem {
         self.lay_forces(bodies);
     }
 
-    /// Force [N] of contact `i` on its side 0.
+    /// Force \[N\] of contact `i` on its side 0.
     pub fn force(&self, i: usize) -> Vec3 {
         self.rows[i].force(&self.lambda[self.problem.offsets[i]..self.problem.offsets[i + 1]])
     }
 
-    /// Gap [m] of contact `i` at the end of the step.
+    /// Gap \[m\] of contact `i` at the end of the step.
     pub fn final_gap(&self, i: usize) -> f64 {
         let normal = self.problem.offsets[i];
         self.g_free[normal] + self.slips[normal] - self.goals[i] + self.rows[i].gap
@@ -242,7 +242,7 @@ fn goal(row: &Row, bodies: &[BodyProblem], partners: &[Partner], h: f64, limits:
     row.gap.max(-limits.recovery_speed * h)
 }
 
-/// How far side 0 has moved against side 1 since the start of the step [m]: bodies at their trial
+/// How far side 0 has moved against side 1 since the start of the step \[m\]: bodies at their trial
 /// positions, partners under these reactions.
 fn relative_motion(
     row: &Row,

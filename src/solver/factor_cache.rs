@@ -41,7 +41,7 @@ const UNUSED_STEPS: u64 = 120;
 
 impl FactorCache {
     /// Starts a step: forgets factors that nobody used for a while, and, least recently used first,
-    /// columns beyond the budget [bytes].
+    /// columns beyond the budget \[bytes\].
     pub fn begin_step(&mut self, column_budget: usize) {
         self.step += 1;
         let oldest = self.step.saturating_sub(UNUSED_STEPS);

@@ -50,7 +50,7 @@ const MAX_SCALING: f64 = 1024.0;
 const ROUNDING: f64 = 1.0e-12;
 
 impl Island {
-    /// Does the iterations of a step of `h` [s]; results are in the bodies' `current` and in the
+    /// Does the iterations of a step of `h` \[s\]; results are in the bodies' `current` and in the
     /// contacts' forces.
     pub fn solve(&mut self, factors: &FactorCache, partners: &[Partner], h: f64, limits: &ContactLimits) {
         self.report = IslandReport::default();

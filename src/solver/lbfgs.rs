@@ -14,9 +14,9 @@ pub(crate) struct Lbfgs {
 }
 
 struct Pair {
-    /// Change of position [m].
+    /// Change of position \[m\].
     moved: Vec<Vec3>,
-    /// Minus the change of the residual [N], contact forces left out.
+    /// Minus the change of the residual \[N\], contact forces left out.
     force: Vec<Vec3>,
     inverse_curvature: f64,
 }

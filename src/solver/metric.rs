@@ -66,7 +66,7 @@ impl Metric {
         self.deflation.active = false;
     }
 
-    /// Turns the body's one frame to `rotation` if that differs by more than `angle` [rad]; true if so.
+    /// Turns the body's one frame to `rotation` if that differs by more than `angle` \[rad\]; true if so.
     pub fn turn_floating(&mut self, rotation: &Mat3, angle: f64) -> bool {
         if self.kind != FrameKind::Floating {
             return false;
@@ -136,7 +136,7 @@ impl Metric {
         };
     }
 
-    /// `out = P r`: displacements [m] of forces [N].
+    /// `out = P r`: displacements \[m\] of forces \[N\].
     pub fn apply(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
         if !self.deflation.active {
             self.rotate_and_solve(factor, r, out);

@@ -34,7 +34,7 @@ pub(crate) struct Reaction {
 }
 
 impl Partner {
-    /// Displacement of the point `p` [m] over a step of `h` without contact.
+    /// Displacement of the point `p` \[m\] over a step of `h` without contact.
     pub fn free_displacement(&self, p: &Vec3, h: f64) -> Vec3 {
         match self {
             Self::Prescribed { start, end } => end.transform(&start.inverse_transform(p)) - p,
@@ -44,7 +44,7 @@ impl Partner {
         }
     }
 
-    /// What a reaction adds to the displacement of the point `p` [m].
+    /// What a reaction adds to the displacement of the point `p` \[m\].
     pub fn displacement_by(&self, reaction: &Reaction, p: &Vec3, h: f64) -> Vec3 {
         match self {
             Self::Prescribed { .. } => Vec3::zeros(),
@@ -63,7 +63,7 @@ impl Partner {
         }
     }
 
-    /// `h²·d_aᵀ J M⁻¹ Jᵀ d_b`: displacement [m] at point `p` along `a` per force [N] at `q` along `b`.
+    /// `h²·d_aᵀ J M⁻¹ Jᵀ d_b`: displacement \[m\] at point `p` along `a` per force \[N\] at `q` along `b`.
     pub fn compliance(&self, p: &Vec3, a: &Vec3, q: &Vec3, b: &Vec3, h: f64) -> f64 {
         match self {
             Self::Prescribed { .. } => 0.0,
@@ -80,7 +80,7 @@ impl Partner {
         matches!(self, Self::Rigid { .. })
     }
 
-    /// Adds a force [N] that acts over a step at the point `p`.
+    /// Adds a force \[N\] that acts over a step at the point `p`.
     pub fn add_reaction(&self, reaction: &mut Reaction, p: &Vec3, force: &Vec3, h: f64) {
         reaction.touched = true;
         reaction.impulse += force * h;
