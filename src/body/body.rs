@@ -226,7 +226,8 @@ impl DeformableBody {
     pub fn elastic_energy(&self) -> f64 {
         let mut unused = vec![Vec3::zeros(); self.state.x.len()];
         let undamped = elastic::StiffnessDamping::default();
-        elastic::add_forces(&self.model, &self.material, &undamped, &self.state.x, &mut unused)
+        let frame = crate::math::Mat3::identity();
+        elastic::add_forces(&self.model, &self.material, &undamped, &self.state.x, &frame, &mut unused).energy
     }
 
     /// Sets the velocity of all vertices [m/s].

@@ -38,21 +38,32 @@ impl StiffnessDamping {
     }
 }
 
-/// Adds the elastic (and damping) forces \[N\] at positions `x` to `force` and returns the energy \[J\].
+/// What an evaluation tells besides the forces.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Elastic {
+    /// Energy \[J\].
+    pub energy: f64,
+    /// Least `tr(QᵀR)` over the elements, `1 + 2 cos θ` of the largest turn θ against the frame Q.
+    pub least_trace: f64,
+}
+
+/// Adds the elastic (and damping) forces \[N\] at positions `x` to `force`; `frame` is what the turn of
+/// the elements is measured against.
 pub(crate) fn add_forces(
     model: &DeformableModel,
     material: &DeformableMaterial,
     damping: &StiffnessDamping,
     x: &[Vec3],
+    frame: &Mat3,
     force: &mut [Vec3],
-) -> f64 {
+) -> Elastic {
     with_energy!(material, energy => {
         #[cfg(target_arch = "x86_64")]
         if std::is_x86_feature_detected!("avx2") {
             // SAFETY: the feature was just detected. No fused operations: the same bits as below.
-            return unsafe { sum_elements_avx2(energy, model, material, damping, x, force) };
+            return unsafe { sum_elements_avx2(energy, model, material, damping, x, frame, force) };
         }
-        sum_elements(energy, model, material, damping, x, force)
+        sum_elements(energy, model, material, damping, x, frame, force)
     })
 }
 
@@ -64,9 +75,10 @@ fn sum_elements_avx2(
     material: &DeformableMaterial,
     damping: &StiffnessDamping,
     x: &[Vec3],
+    frame: &Mat3,
     force: &mut [Vec3],
-) -> f64 {
-    sum_elements(energy, model, material, damping, x, force)
+) -> Elastic {
+    sum_elements(energy, model, material, damping, x, frame, force)
 }
 
 #[inline(always)]
@@ -76,10 +88,12 @@ fn sum_elements(
     material: &DeformableMaterial,
     damping: &StiffnessDamping,
     x: &[Vec3],
+    frame: &Mat3,
     force: &mut [Vec3],
-) -> f64 {
+) -> Elastic {
     let lame = material.lame();
     let mut total = Lane::default();
+    let mut least_trace = Lane::splat(3.0);
     for (k, block) in model.blocks.iter().enumerate() {
         let F = deformation_gradient(block, x);
         let mut response = energy.evaluate(&F);
@@ -90,8 +104,16 @@ fn sum_elements(
         }
         total += response.density * block.volumes;
         scatter_forces(block, &response.stress, force);
+        let mut trace = Lane::default();
+        for c in 0..3 {
+            for r in 0..3 {
+                trace += response.rotation.at(r, c) * frame[(r, c)];
+            }
+        }
+        least_trace = least_trace.zip(trace, f64::min);
     }
-    total.sum()
+    let least_trace = least_trace.0.into_iter().fold(3.0, f64::min);
+    Elastic { energy: total.sum(), least_trace }
 }
 
 /// Damping's energy density and stress, both per β/h.
@@ -168,12 +190,33 @@ fn transpose_mul(a: &LaneMat3, b: &LaneMat3) -> LaneMat3 {
     out
 }
 
-/// Rotations of the elements of a body at `x`, block by block.
-pub(crate) fn element_rotations<'a>(
-    model: &'a DeformableModel,
-    x: &'a [Vec3],
-) -> impl Iterator<Item = (&'a ElementBlock, LaneMat3)> + 'a {
-    model.blocks.iter().map(|block| (block, polar_rotations(&deformation_gradient(block, x))))
+/// Adds the volume-weighted rotations of the elements around each node to `sums`.
+pub(crate) fn add_node_rotations(model: &DeformableModel, x: &[Vec3], sums: &mut [Mat3]) {
+    #[cfg(target_arch = "x86_64")]
+    if std::is_x86_feature_detected!("avx2") {
+        // SAFETY: the feature was just detected.
+        return unsafe { sum_rotations_avx2(model, x, sums) };
+    }
+    sum_rotations(model, x, sums);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn sum_rotations_avx2(model: &DeformableModel, x: &[Vec3], sums: &mut [Mat3]) {
+    sum_rotations(model, x, sums);
+}
+
+#[inline(always)]
+fn sum_rotations(model: &DeformableModel, x: &[Vec3], sums: &mut [Mat3]) {
+    for block in &model.blocks {
+        let rotations = polar_rotations(&deformation_gradient(block, x)).scaled(block.volumes);
+        for i in 0..LANES {
+            let weighted = rotations.lane(i);
+            for a in 0..4 {
+                sums[block.corners[a][i] as usize] += weighted;
+            }
+        }
+    }
 }
 
 /// The rotation that carries the rest shape nearest to `x` in the mass-weighted least-squares
@@ -212,8 +255,8 @@ mod tests {
 
     fn forces(material: &DeformableMaterial, damping: &StiffnessDamping, x: &[Vec3]) -> (f64, Vec<Vec3>) {
         let mut f = vec![Vec3::zeros(); x.len()];
-        let e = add_forces(&model(), material, damping, x, &mut f);
-        (e, f)
+        let elastic = add_forces(&model(), material, damping, x, &Mat3::identity(), &mut f);
+        (elastic.energy, f)
     }
 
     fn shaken(seed: u64, size: f64) -> Vec<Vec3> {
@@ -289,7 +332,7 @@ mod tests {
         for elasticity in [Elasticity::LinearCorotated, Elasticity::Projective] {
             let material = DeformableMaterial::new(1.0, 0.3).elasticity(elasticity);
             let mut f = vec![Vec3::zeros(); x.len()];
-            add_forces(&model, &material, &StiffnessDamping::default(), &x, &mut f);
+            add_forces(&model, &material, &StiffnessDamping::default(), &x, &Mat3::identity(), &mut f);
             for (X, f) in model.rest.iter().zip(&f) {
                 if X.iter().all(|c| c.abs() < 0.29) {
                     assert!(f.norm() < 1e-10, "{elasticity:?}: {f}");

@@ -3,6 +3,7 @@
 //! Everything inside the crate is `f64`; rapier's `f32` types appear only at the surface, through
 //! [`to_real`] and [`from_real`].
 
+pub(crate) mod dense;
 pub(crate) mod lanes;
 pub(crate) mod polar;
 

@@ -46,6 +46,8 @@ pub(crate) struct BodyProblem {
     /// A force that counts as large for this body \[N\].
     pub weight: f64,
     step: Vec<Vec3>,
+    /// The body's frame at the start of the iteration.
+    frame: Mat3,
     /// Where the pinned nodes would go by inertia and external forces.
     pinned_inertia: Vec<Vec3>,
 }
@@ -60,6 +62,8 @@ pub(crate) struct Iterate {
     pub objective: f64,
     /// Sum of the sizes of Ψ's terms \[J\], for its rounding.
     pub magnitude: f64,
+    /// Least `tr(QᵀR)` of the elements against the body's frame.
+    pub least_trace: f64,
     /// Largest internal force on a node \[N\].
     pub internal: f64,
 }
@@ -88,6 +92,7 @@ impl BodyProblem {
             guard_retries: 0,
             weight: 0.0,
             step: vec![Vec3::zeros(); n],
+            frame: Mat3::identity(),
             pinned_inertia: Vec::new(),
         };
         problem.begin(body, h, gravity);
@@ -146,6 +151,7 @@ impl BodyProblem {
                 self.current.x[p as usize] = self.target[p as usize];
             }
         }
+        self.frame = turned;
         self.evaluate_current();
         self.trial.x.clone_from(&self.target);
         self.evaluate_trial();
@@ -163,7 +169,7 @@ impl BodyProblem {
         let per_node = match self.settings.frames {
             Frames::Floating => false,
             Frames::PerNode => true,
-            Frames::Automatic => self.bends_beyond(turned, FLOATING_LIMIT),
+            Frames::Automatic => self.current.least_trace < 1.0 + 2.0 * FLOATING_LIMIT.cos(),
         };
         if per_node {
             let mobility = self.h * self.h / (1.0 + self.material.mass_damping * self.h);
@@ -183,14 +189,6 @@ impl BodyProblem {
         }
         let (turned, _, _) = elastic::floating_frame(&self.model, &self.current.x);
         self.metric.turn_floating(&turned, FRAME_ERROR)
-    }
-
-    /// Whether some element has turned by more than `limit` \[rad\] against the frame.
-    fn bends_beyond(&self, frame: &Mat3, limit: f64) -> bool {
-        let least = 1.0 + 2.0 * limit.cos();
-        elastic::element_rotations(&self.model, &self.current.x).any(|(_, rotations)| {
-            (0..crate::math::lanes::LANES).any(|i| frame.dot(&rotations.lane(i)) < least)
-        })
     }
 
     /// Sets the trial to `x + P(r + Jᵀλ⁰)/c`.
@@ -293,7 +291,9 @@ impl BodyProblem {
     fn evaluate(&self, at: &mut Iterate) {
         at.r.clear();
         at.r.resize(at.x.len(), Vec3::zeros());
-        let elastic = elastic::add_forces(&self.model, &self.material, &self.damping, &at.x, &mut at.r);
+        let (model, material, damping) = (&self.model, &self.material, &self.damping);
+        let elastic = elastic::add_forces(model, material, damping, &at.x, &self.frame, &mut at.r);
+        at.least_trace = elastic.least_trace;
         at.internal = at.r.iter().map(|f| f.amax()).fold(0.0, f64::max);
         let (inertia, drag) = (1.0 / (self.h * self.h), self.material.mass_damping / self.h);
         let mut kinetic = 0.0;
@@ -303,8 +303,8 @@ impl BodyProblem {
             at.r[i] += (from_target * inertia - moved * drag) * m;
             kinetic += m * (inertia * from_target.norm_squared() + drag * moved.norm_squared());
         }
-        at.objective = elastic + 0.5 * kinetic;
-        at.magnitude = elastic + 0.5 * kinetic;
+        at.objective = elastic.energy + 0.5 * kinetic;
+        at.magnitude = at.objective;
     }
 
     /// The guard [cf. Nocedal & Wright 2006, sufficient decrease]:

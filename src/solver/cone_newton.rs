@@ -7,6 +7,7 @@
 
 use super::factor::DenseFactor;
 use crate::contact::cone;
+use crate::math::dense;
 
 /// The data of one problem. `dims[i]` is 3, or 1 without friction; everything else is packed by it.
 #[derive(Default)]
@@ -41,6 +42,8 @@ pub(crate) struct ConeWork {
 const EPSILON: f64 = 1.0e-4;
 /// Newton steps that a warm start may take before the ladder is climbed.
 const WARM_STEPS: usize = 4;
+/// What `λ − γ(λ)` is worth at the start: gaps that are off by δ move γ by δ/R, forces by δ/W only.
+const AS_GOOD: f64 = 1.0 / EPSILON;
 /// Newton steps on a rung of the ladder.
 const RUNG_STEPS: usize = 40;
 /// Rungs tried when warm start and short ladder failed.
@@ -81,44 +84,41 @@ impl ConeProblem {
 
     /// `out = W v`.
     pub fn multiply(&self, v: &[f64], out: &mut Vec<f64>) {
-        let m = self.rows();
-        out.clear();
-        out.resize(m, 0.0);
-        for (column, &vj) in self.W.chunks_exact(m.max(1)).zip(v) {
-            if vj != 0.0 {
-                for (o, w) in out.iter_mut().zip(column) {
-                    *o += w * vj;
-                }
-            }
-        }
+        out.resize(self.rows(), 0.0);
+        dense::multiply(&self.W, v, out);
     }
 }
 
 impl ConeSolver {
     /// Improves `lambda` \[N\], which holds the proximal centre and the start, to the solution.
-    pub fn solve(&mut self, problem: &ConeProblem, lambda: &mut [f64], tolerance: ConeTolerance) -> ConeWork {
+    /// `W_lambda` holds the product of the two and is kept so.
+    pub fn solve(
+        &mut self,
+        problem: &ConeProblem,
+        lambda: &mut [f64],
+        W_lambda: &mut Vec<f64>,
+        tolerance: ConeTolerance,
+    ) -> ConeWork {
         let mut work = ConeWork::default();
         if problem.contacts() == 0 {
             return work;
         }
-        self.z.clear();
-        self.z.extend_from_slice(lambda);
+        if self.is_good(problem, lambda, W_lambda, tolerance) {
+            // Not a bit of it changes, so nothing has to be done again.
+            return work;
+        }
         let mut climb = |solver: &mut Self, rungs: &[(f64, usize)]| {
             solver.z.clear();
             solver.z.extend_from_slice(lambda);
             solver.center.clear();
             solver.center.extend_from_slice(lambda);
+            solver.Wz.clone_from(W_lambda);
             rungs.iter().all(|&(epsilon, steps)| {
                 let done = solver.minimise(problem, epsilon, steps, tolerance, &mut work);
                 solver.center.clone_from(&solver.gamma);
                 done
             })
         };
-        let at_once = climb(self, &[(EPSILON, 0)]);
-        if at_once {
-            // Good as it is: not a bit of it changes, so nothing has to be done again.
-            return work;
-        }
         let done = climb(self, &[(EPSILON, WARM_STEPS)])
             || climb(self, &[(1e-2, RUNG_STEPS), (EPSILON, RUNG_STEPS)])
             || climb(self, &LONG_LADDER.map(|e| (e, RUNG_STEPS)));
@@ -127,8 +127,25 @@ impl ConeSolver {
         }
         if self.gamma.iter().all(|g| g.is_finite()) {
             lambda.copy_from_slice(&self.gamma);
+            problem.multiply(lambda, W_lambda);
         }
         work
+    }
+
+    /// Whether the forces solve the problem as they are.
+    fn is_good(&mut self, problem: &ConeProblem, lambda: &[f64], W_lambda: &[f64], tolerance: ConeTolerance) -> bool {
+        self.set_regularisation(problem, EPSILON);
+        self.center.clear();
+        self.center.extend_from_slice(lambda);
+        self.Wz.clear();
+        self.Wz.extend_from_slice(W_lambda);
+        self.project(problem);
+        let scale = largest(self.gamma.iter().copied()).max(tolerance.floor);
+        (0..problem.contacts()).all(|i| {
+            let rows = problem.offsets[i]..problem.offsets[i + 1];
+            let error = largest(rows.map(|k| lambda[k] - self.gamma[k]));
+            error <= AS_GOOD * tolerance.relative * scale
+        })
     }
 
     /// Newton's method at one ε, from z; leaves the force in γ.
@@ -142,7 +159,6 @@ impl ConeSolver {
     ) -> bool {
         self.set_regularisation(problem, epsilon);
         let mut z = std::mem::take(&mut self.z);
-        problem.multiply(&z, &mut self.Wz);
         self.project(problem);
         let mut done = false;
         for step in 0..=steps {

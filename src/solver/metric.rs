@@ -10,10 +10,10 @@
 use super::factor::FactorScratch;
 use super::factor_cache::SystemFactor;
 use super::system::FactorKey;
-use crate::body::elastic::element_rotations;
+use crate::body::elastic::add_node_rotations;
 use crate::body::{DeformableModel, SystemMatrix};
-use crate::math::lanes::LANES;
-use crate::math::polar::polar_rotation;
+use crate::math::lanes::{LANES, LaneMat3};
+use crate::math::polar::polar_rotations;
 use crate::math::{Mat3, Vec3};
 
 /// Frames of one body and what follows from them.
@@ -93,15 +93,17 @@ impl Metric {
         self.kind = FrameKind::PerNode;
         self.per_node.clear();
         self.per_node.resize(x.len(), Mat3::zeros());
-        for (block, rotations) in element_rotations(model, x) {
+        add_node_rotations(model, x, &mut self.per_node);
+        for chunk in self.per_node.chunks_mut(LANES) {
+            // Scaled to about one, four at a time; the last chunk repeats its last.
+            let mut block = LaneMat3::default();
             for i in 0..LANES {
-                let weighted = rotations.lane(i) * block.volumes.0[i];
-                for a in 0..4 {
-                    self.per_node[block.corners[a][i] as usize] += weighted;
-                }
+                let sum = &chunk[i.min(chunk.len() - 1)];
+                block.set_lane(i, &(sum / sum.norm().max(f64::MIN_POSITIVE)));
             }
+            let rotations = polar_rotations(&block);
+            chunk.iter_mut().enumerate().for_each(|(i, q)| *q = rounded(&rotations.lane(i)));
         }
-        self.per_node.iter_mut().for_each(|q| *q = rounded(&polar_rotation(q)));
         self.deflation.active = key.pins.is_empty();
         if self.deflation.active {
             self.refresh_deflation(masses, mobility, key, factor);
@@ -204,6 +206,14 @@ impl Metric {
         let rigid =
             d.mean / (d.total_mass * d.total_mass) + Mat3::from_diagonal_element(d.mobility / d.total_mass);
         block - (d.coupling[i] + d.coupling[j].transpose()) / d.total_mass + rigid
+    }
+
+    /// The one frame of the body, if it has one.
+    pub fn floating_frame(&self) -> Mat3 {
+        match self.kind {
+            FrameKind::Floating => self.floating,
+            FrameKind::Isotropic | FrameKind::PerNode => Mat3::zeros(),
+        }
     }
 
     /// Whether every node has a frame of its own, as in bodies that bend.

@@ -208,9 +208,10 @@ proptest! {
         let problem = random_problem(contacts, rank, mu, &numbers);
         let mut lambda = vec![0.0; problem.rows()];
         let mut solver = ConeSolver::default();
+        let mut product = lambda.clone();
         // Outer proximal iterations: at the fixed point the regularisation cancels.
         for _ in 0..200 {
-            solver.solve(&problem, &mut lambda, ConeTolerance { relative: 1e-12, floor: 1e-9 });
+            solver.solve(&problem, &mut lambda, &mut product, ConeTolerance { relative: 1e-12, floor: 1e-9 });
         }
         for i in 0..contacts {
             prop_assert!(lambda[3 * i + 1].hypot(lambda[3 * i + 2]) <= mu * lambda[3 * i] + 1e-9);
