@@ -133,7 +133,13 @@ impl ConeSolver {
     }
 
     /// Whether the forces solve the problem as they are.
-    fn is_good(&mut self, problem: &ConeProblem, lambda: &[f64], W_lambda: &[f64], tolerance: ConeTolerance) -> bool {
+    fn is_good(
+        &mut self,
+        problem: &ConeProblem,
+        lambda: &[f64],
+        W_lambda: &[f64],
+        tolerance: ConeTolerance,
+    ) -> bool {
         self.set_regularisation(problem, EPSILON);
         self.center.clear();
         self.center.extend_from_slice(lambda);

@@ -70,7 +70,9 @@ impl Ingredients {
                     }
                     Side::Partner { partner, point } => {
                         self.nodes.push(partner.0);
-                        if let Partner::Rigid { com, inv_mass, inv_inertia, .. } = &partners[partner.0 as usize] {
+                        if let Partner::Rigid { com, inv_mass, inv_inertia, .. } =
+                            &partners[partner.0 as usize]
+                        {
                             self.bits.extend(point.iter().chain(com).chain(inv_mass).chain(inv_inertia));
                         }
                     }
@@ -125,7 +127,13 @@ impl ContactSystem {
 
     /// Assembles W for the current frames and scalings of the bodies, unless the last one was made of
     /// the same bits: so it is at rest.
-    pub fn assemble(&mut self, bodies: &[BodyProblem], factors: &[&SystemFactor], partners: &[Partner], h: f64) {
+    pub fn assemble(
+        &mut self,
+        bodies: &[BodyProblem],
+        factors: &[&SystemFactor],
+        partners: &[Partner],
+        h: f64,
+    ) {
         let mut made_from = std::mem::take(&mut self.fresh);
         made_from.describe(&self.rows, bodies, partners, h);
         if made_from.comparable && made_from == self.made_from {
