@@ -10,7 +10,7 @@
 //! | `math` | vectors, SIMD lanes, polar decomposition |
 //! | `mesh` | tetrahedra: made, filled, read, checked; their surface |
 //! | `energy`, `material` | elastic energies, one per file; Young's modulus and the like |
-//! | `body` | model (constant), state (what a snapshot holds), body, builder, set |
+//! | `body`, `error` | model (constant), state (what a snapshot holds), body, builder, set |
 //! | `contact` | obstacles, closest features, rows, friction cone |
 //! | `solver` | constant matrix and factor, global iteration, contact problem |
 //! | `coupling` | rapier's sets, read and written |
@@ -18,7 +18,7 @@
 //!
 //! # Invariants
 //! - A module imports from modules above it in the table only (`tests/architecture.rs`).
-//! - Only `coupling` knows rapier's sets, only `contact` names parry's queries, only
+//! - Only `coupling` reads and writes rapier's sets (`pipeline` passes them on), only `contact` names parry's queries, only
 //!   `solver/factor.rs` names faer.
 //! - State is `f64`; rapier's `f32` types appear at the surface.
 //! - Stepping never fails and never panics on data; what it keeps between steps is state, or is keyed

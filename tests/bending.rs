@@ -18,6 +18,7 @@ fn falling_tip(e: f64, nu: f64, settings: SolverSettings, seconds: f32) -> Vec<f
     steps
         .map(|_| {
             world.step(&mut physics);
+            assert!(world.bodies[beam].is_enabled());
             mean_position(&world.bodies[beam], &tip)[1]
         })
         .collect()
@@ -48,7 +49,8 @@ fn slender_cantilever_follows_the_converged_sequence_at_default_settings() {
 }
 
 /// A free bar laid into a shape and let go without gravity: its energy must not grow.
-fn let_go(shape: impl Fn([f64; 3]) -> [f64; 3], e: f64, settings: SolverSettings) -> f64 {
+/// Its highest energy in units of the start's, and where its vertices are after half a second.
+fn let_go(shape: impl Fn([f64; 3]) -> [f64; 3], e: f64, settings: SolverSettings) -> (f64, Vec<[f64; 3]>) {
     let mut physics = PhysicsWorld::new();
     physics.gravity = Vector::ZERO;
     let mut world = DeformableWorld::new();
@@ -62,14 +64,18 @@ fn let_go(shape: impl Fn([f64; 3]) -> [f64; 3], e: f64, settings: SolverSettings
         body.set_position(v, p).unwrap();
     }
     let start = body.elastic_energy();
-    let mut highest = 0.0_f64;
-    for _ in 0..180 {
+    let (mut highest, mut after) = (0.0_f64, Vec::new());
+    for step in 0..180 {
         world.step(&mut physics);
+        if step == 29 {
+            let body = &world.bodies[bar];
+            after = (0..body.vertex_count()).map(|v| body.position(v).unwrap()).collect();
+        }
         let body = &world.bodies[bar];
         highest = highest.max((body.elastic_energy() + body.kinetic_energy()) / start);
     }
     assert!(world.bodies[bar].is_enabled());
-    highest
+    (highest, after)
 }
 
 fn bent_by_180_degrees([x, y, z]: [f64; 3]) -> [f64; 3] {
@@ -83,17 +89,37 @@ fn twisted_by_180_degrees([x, y, z]: [f64; 3]) -> [f64; 3] {
 }
 
 #[test]
-fn bars_bent_and_twisted_by_180_degrees_never_gain_energy() {
+fn bars_bent_and_twisted_by_180_degrees_never_blow_up() {
     for e in [1e5, 1e6, 1e7, 1e9] {
-        for iterations in [1, 2, 3, 10] {
-            let settings = SolverSettings::iterations(iterations);
-            let bent = let_go(bent_by_180_degrees, e, settings);
-            let twisted = let_go(twisted_by_180_degrees, e, settings);
+        let truth =
+            [let_go(bent_by_180_degrees, e, converged()).1, let_go(twisted_by_180_degrees, e, converged()).1];
+        let defaults = SolverSettings::default();
+        for settings in [1, 2, 3, 10].map(SolverSettings::iterations).into_iter().chain([defaults]) {
+            let found =
+                [let_go(bent_by_180_degrees, e, settings), let_go(twisted_by_180_degrees, e, settings)];
+            let distance =
+                |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
+            let error = |k: usize| {
+                let pairs = found[k].1.iter().zip(&truth[k]);
+                pairs.map(|(a, b)| distance(a, b)).fold(0.0, f64::max)
+            };
+            let (highest, what) =
+                (found[0].0.max(found[1].0), format!("E {e:e}, {} it.", settings.max_iterations));
             println!(
-                "E {e:e}, {iterations} it.: highest energy {bent:.4} (bent) {twisted:.4} (twisted) of the start"
+                "{what}: highest energy {highest:.4} of the start, off by {:.3} m (bent), {:.3} m (twisted) after 0.5 s",
+                error(0),
+                error(1)
             );
             // Implicit Euler is dissipative but for the energy's nonconvexity: 2e-3, as at impacts.
-            assert!(bent < 1.002 && twisted < 1.002, "E {e:e}, {iterations} it.: {bent} {twisted}");
+            assert!(highest < 1.002, "{what}: {highest}");
+            // Half a turn of bend springing back is fast: at the default knobs the shape is off by up to
+            // a tenth of its length against the converged steps, at ten iterations by less.
+            assert!(
+                settings != defaults || error(0).max(error(1)) < 0.15,
+                "{what}: {} {}",
+                error(0),
+                error(1)
+            );
         }
     }
 }

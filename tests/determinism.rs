@@ -2,6 +2,7 @@
 //! restored state.
 mod common;
 use common::*;
+use foible3d::DeformableState;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 
@@ -16,9 +17,9 @@ fn scene() -> (PhysicsWorld, DeformableWorld) {
             .material(DeformableMaterial::new(1e5 * (k + 1) as f64, 0.35).friction(MU));
         world.insert(body).unwrap();
     }
-    let plank = RigidBodyBuilder::dynamic().translation(Vector::new(0.0, 0.7, 0.0));
+    let plank = RigidBodyBuilder::dynamic().translation(Vector::new(0.0, 0.7, 0.0)).can_sleep(false);
     physics.insert(plank, ColliderBuilder::cuboid(0.5, 0.05, 0.1).density(500.0).friction(0.5));
-    let ball = RigidBodyBuilder::dynamic().translation(Vector::new(2.05, 0.8, 0.02));
+    let ball = RigidBodyBuilder::dynamic().translation(Vector::new(2.05, 0.8, 0.02)).can_sleep(false);
     physics.insert(ball, ColliderBuilder::ball(0.1).density(500.0).friction(0.5));
     (physics, world)
 }
@@ -26,8 +27,6 @@ fn scene() -> (PhysicsWorld, DeformableWorld) {
 fn states(world: &DeformableWorld) -> Vec<DeformableState> {
     world.bodies.iter().map(|(_, b)| b.state().clone()).collect()
 }
-
-use foible3d::DeformableState;
 
 fn run(steps: usize, mut each: impl FnMut(&mut DeformableWorld)) -> Vec<DeformableState> {
     let (mut physics, mut world) = scene();

@@ -15,7 +15,7 @@ fn on_slope(theta: f32, mu: f64, e: f64, steps: usize) -> Vec<f64> {
     let mut world = DeformableWorld::new();
     let rotation = Rotation::from_scaled_axis(turn);
     // Set down, not dropped: where tan θ is a hair below μ an impact would start it.
-    let body = cube(DeformableMaterial::new(e, 0.3).mass_damping(0.0), 0.0)
+    let body = cube(DeformableMaterial::new(e, 0.3), 0.0)
         .pose(Pose::from_parts(rotation * Vector::new(0.0, 0.2, 0.0), rotation))
         .material(DeformableMaterial::new(e, 0.3).friction(mu));
     let body = world.insert(body).unwrap();

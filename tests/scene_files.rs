@@ -50,16 +50,31 @@ fn shipped_scenes_parse() {
 #[test]
 fn wrong_files_are_answered_with_line_key_and_what_would_be_right() {
     // What is replaced by what; the line; what the answer has to say.
-    let table: [(&str, &str, usize, &[&str]); 16] = [
+    let table: [(&str, &str, usize, &[&str]); 21] = [
         ("duration = 1.0", "duration = -1.0", 2, &["duration", "positive"]),
         ("duration = 1.0", "durations = 1.0", 2, &["durations", "duration"]),
-        ("duration = 1.0", "duration = \"long\"", 2, &["string", "f32"]),
+        ("duration = 1.0", "duration = \"long\"", 2, &["duration", "string", "number"]),
         ("duration = 1.0", "duration = 1.0\ndt = 0.0", 3, &["dt", "positive"]),
         ("kind = \"fixed\"", "kind = \"static\"", 6, &["static", "fixed", "dynamic", "kinematic"]),
         ("cuboid = { half", "cubold = { half", 7, &["cubold", "cuboid"]),
-        ("half_extents = [1.0, 0.5, 1.0]", "half_extents = [1.0, 0.5]", 7, &["length"]),
+        ("half_extents = [1.0, 0.5, 1.0]", "half_extents = [1.0, 0.5]", 7, &["half_extents", "2", "3"]),
         ("poisson_ratio = 0.3", "poisson = 0.3", 12, &["poisson", "poisson_ratio"]),
         ("youngs_modulus = 1.0e6, ", "", 12, &["missing", "youngs_modulus"]),
+        ("poisson_ratio = 0.3", "poisson_ratio = 0.6", 12, &["material", "Poisson's ratio", "0.6", "0.4999"]),
+        ("poisson_ratio = 0.3", "poisson_ratio = 0.3, friction = -1.0", 12, &["friction", "-1", "positive"]),
+        ("cells = [2, 2, 2]", "cells = [2, 0, 2]", 11, &["body", "cells", "0"]),
+        (
+            "lattice = { half_extents = [0.2, 0.2, 0.2], cells = [2, 2, 2] }",
+            "filled = { shape = { ball = { radius = -1.0 } }, cell_size = 0.1 }",
+            11,
+            &["body", "radius", "positive", "-1"],
+        ),
+        (
+            "cuboid = { half_extents = [1.0, 0.5, 1.0] }",
+            "half_space = { normal = [0.0, 0.0, 0.0] }",
+            7,
+            &["shape", "normal", "zero"],
+        ),
         ("name = \"cube\"", "name = \"floor\"", 10, &["floor", "unique"]),
         ("of = \"cube\"\nnear", "of = \"sphere\"\nnear", 16, &["sphere", "of", "cube"]),
         ("on = \"floor\"", "on = \"ceiling\"", 22, &["ceiling", "on", "floor"]),
@@ -73,8 +88,10 @@ fn wrong_files_are_answered_with_line_key_and_what_would_be_right() {
         let answer = file::parse(&GOOD.replacen(right, wrong, 1)).unwrap_err();
         println!("{wrong:?} → {answer}\n");
         assert!(answer.starts_with(&format!("line {line}:")), "{wrong:?}: {answer}");
+        // Without the quoted line, which holds the key anyhow.
+        let said = answer.lines().next().unwrap();
         for word in says {
-            assert!(answer.contains(word), "{wrong:?} should say {word:?}: {answer}");
+            assert!(said.contains(word), "{wrong:?} should say {word:?}: {answer}");
         }
     }
 }

@@ -56,6 +56,10 @@ fn flat_topped_shapes_carry_a_cube() {
         ("heightfield", ColliderBuilder::heightfield(heights, Vector::new(2.0, 1.0, 2.0))),
         ("compound", down(ColliderBuilder::compound(parts))),
         (
+            "round cone upside down",
+            down(ColliderBuilder::round_cone(0.4, 0.4, 0.1)).rotation(Vector::X * std::f32::consts::PI),
+        ),
+        (
             "cone upside down",
             down(ColliderBuilder::cone(0.5, 0.5)).rotation(Vector::X * std::f32::consts::PI),
         ),
@@ -77,6 +81,7 @@ fn round_topped_shapes_carry_a_cube() {
     let shapes = [
         ("ball", down(ColliderBuilder::ball(0.5), 0.5)),
         ("capsule", down(ColliderBuilder::capsule_x(0.5, 0.3), 0.3)),
+        ("capsule upright", down(ColliderBuilder::capsule_y(0.2, 0.3), 0.5)),
         (
             "cylinder on its side",
             down(ColliderBuilder::cylinder(0.5, 0.4), 0.4).rotation(Vector::Z * std::f32::consts::FRAC_PI_2),

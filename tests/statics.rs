@@ -43,14 +43,14 @@ fn cantilever_settles_at_the_static_solution_of_its_mesh() {
         for dt in [1.0 / 30.0, 1.0 / 60.0, 1.0 / 240.0] {
             let tip = settled_tip(e, dt, CELLS);
             println!("E {e:e}, dt {dt:.5}: tip {tip:.5} m, static {expected:.5} m");
-            assert!((tip / expected - 1.0).abs() < 0.01, "E {e:e}, dt {dt}: {tip} against {expected}");
+            assert!((tip / expected - 1.0).abs() < 0.004, "E {e:e}, dt {dt}: {tip} against {expected}");
         }
     }
 }
 
 #[test]
-fn static_reference_is_that_of_the_published_table() {
-    // references.md: 495 tets, 0.02814 m at 1e7 Pa and 0.26736 m at 1e6 Pa; five digits.
+fn static_reference_is_that_of_an_independent_program() {
+    // Found before this crate existed, on the same 495 tets: 0.02814 m at 1e7 Pa, 0.26736 m at 1e6 Pa.
     assert!((static_tip(1e7) + 0.02814).abs() < 1e-5);
     assert!((static_tip(1e6) + 0.26736).abs() < 1e-5);
 }

@@ -40,8 +40,9 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
             .linvel(body.linvel.into())
             .angvel(body.angvel.into())
             .can_sleep(body.can_sleep);
-        let mut collider =
-            ColliderBuilder::new(shape(&body.shape)?).friction(body.friction).restitution(body.restitution);
+        let mut collider = ColliderBuilder::new(shape(body.shape.as_ref()))
+            .friction(body.friction)
+            .restitution(body.restitution);
         if let Some(mass) = &body.mass {
             collider = collider.mass(*mass.as_ref());
         }
@@ -53,7 +54,7 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
     }
     for body in &scene.deformable {
         let name = body.name.as_ref().clone();
-        let handle = deformable(body, folder).and_then(|b| stage.world.insert(b).map_err(|e| e.to_string()));
+        let handle = stage.world.insert(deformable(body, folder));
         stage.deformable.push((name.clone(), handle.map_err(|e| format!("deformable \"{name}\": {e}"))?));
     }
     for probe in &scene.probe {
@@ -73,53 +74,28 @@ fn pose(translation: [f32; 3], degrees: [f32; 3]) -> Pose {
     Pose::from_parts(translation.into(), rotation)
 }
 
-fn shape(shape: &Shape) -> Result<SharedShape, String> {
-    let positive = |numbers: &[f32]| match numbers.iter().all(|n| *n > 0.0) {
-        true => Ok(()),
-        false => Err(format!("lengths of a shape must be positive, not {numbers:?}")),
-    };
-    Ok(match *shape {
-        Shape::Ball { radius } => positive(&[radius]).map(|()| SharedShape::ball(radius))?,
-        Shape::Cuboid { half_extents: [x, y, z] } => {
-            positive(&[x, y, z]).map(|()| SharedShape::cuboid(x, y, z))?
-        }
-        Shape::Capsule { half_height, radius } => {
-            positive(&[half_height, radius]).map(|()| SharedShape::capsule_y(half_height, radius))?
-        }
-        Shape::Cylinder { half_height, radius } => {
-            positive(&[half_height, radius]).map(|()| SharedShape::cylinder(half_height, radius))?
-        }
-        Shape::Cone { half_height, radius } => {
-            positive(&[half_height, radius]).map(|()| SharedShape::cone(half_height, radius))?
-        }
-        Shape::HalfSpace { normal } => {
-            let normal = Vector::from(normal).try_normalize();
-            SharedShape::halfspace(normal.ok_or("the normal of a half-space must not be zero")?)
-        }
-    })
+/// Lengths and normals were checked with the file.
+fn shape(shape: &Shape) -> SharedShape {
+    match *shape {
+        Shape::Ball { radius } => SharedShape::ball(radius),
+        Shape::Cuboid { half_extents: [x, y, z] } => SharedShape::cuboid(x, y, z),
+        Shape::Capsule { half_height, radius } => SharedShape::capsule_y(half_height, radius),
+        Shape::Cylinder { half_height, radius } => SharedShape::cylinder(half_height, radius),
+        Shape::Cone { half_height, radius } => SharedShape::cone(half_height, radius),
+        Shape::HalfSpace { normal } => SharedShape::halfspace(Vector::from(normal).normalize()),
+    }
 }
 
-fn deformable(body: &file::Deformable, folder: &Path) -> Result<DeformableBodyBuilder, String> {
+fn deformable(body: &file::Deformable, folder: &Path) -> DeformableBodyBuilder {
     let builder = match body.body.as_ref() {
         Body::Lattice { half_extents, cells } => {
             DeformableBodyBuilder::cuboid((*half_extents).into(), *cells)
         }
         Body::Filled { shape: filled, cell_size } => {
-            DeformableBodyBuilder::filled(&*shape(filled)?, *cell_size)
+            DeformableBodyBuilder::filled(&*shape(filled), *cell_size)
         }
         Body::Mesh { path } => DeformableBodyBuilder::gmsh(folder.join(path)),
     };
-    let m = body.material.as_ref();
-    let material = DeformableMaterial::new(m.youngs_modulus, m.poisson_ratio)
-        .density(m.density)
-        .friction(m.friction)
-        .restitution(m.restitution)
-        .mass_damping(m.mass_damping)
-        .stiffness_damping(m.stiffness_damping)
-        .elasticity(match m.elasticity {
-            file::Elasticity::LinearCorotated => Elasticity::LinearCorotated,
-            file::Elasticity::Projective => Elasticity::Projective,
-        });
     let defaults = SolverSettings::default();
     let settings = SolverSettings {
         system: match body.solver.system {
@@ -143,15 +119,15 @@ fn deformable(body: &file::Deformable, folder: &Path) -> Result<DeformableBodyBu
         .pose(pose(body.translation, body.rotation))
         .linvel(body.linvel.into())
         .angvel(body.angvel.into())
-        .material(material)
+        .material(body.material.as_ref().to_material())
         .settings(settings);
-    Ok(match body.pinned {
+    match body.pinned {
         Some(region) => {
             let (low, high) = (Vector::from(region.min), Vector::from(region.max));
             builder.pinned(move |x| x.cmpge(low).all() && x.cmple(high).all())
         }
         None => builder,
-    })
+    }
 }
 
 impl Stage {

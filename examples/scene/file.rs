@@ -47,7 +47,7 @@ fn dt() -> Spanned<f32> {
 pub struct Rigid {
     pub name: Spanned<String>,
     pub kind: Kind,
-    pub shape: Shape,
+    pub shape: Spanned<Shape>,
     pub mass: Option<Spanned<f32>>,
     pub density: Option<Spanned<f32>>,
     #[serde(default)]
@@ -247,8 +247,17 @@ pub fn parse(text: &str) -> Result<Scene, String> {
     Ok(scene)
 }
 
+/// The parser's words, with the key where they lack it and without Rust's names of types.
 fn syntax_error(text: &str, error: &toml::de::Error) -> String {
-    at_line(text, error.span().map_or(0, |s| s.start), error.message())
+    let offset = error.span().map_or(0, |s| s.start);
+    let message = error
+        .message()
+        .replace("expected f32", "expected a number")
+        .replace("expected f64", "expected a number");
+    let before = text[..offset.min(text.len())].rsplit(['\n', '{', ',']).next().unwrap_or_default();
+    let key: String = before.trim().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+    let named = key.is_empty() || message.contains(&key);
+    at_line(text, offset, &if named { message } else { format!("`{key}`: {message}") })
 }
 
 fn at_line(text: &str, offset: usize, what: &str) -> String {
@@ -288,6 +297,16 @@ fn check(scene: &Scene) -> Result<(), Mistake> {
         }
         body.mass.as_ref().map_or(Ok(()), |m| positive(m, "mass"))?;
         body.density.as_ref().map_or(Ok(()), |d| positive(d, "density"))?;
+    }
+    for body in &scene.rigid {
+        let problem = shape_problem(body.shape.as_ref());
+        problem.map_or(Ok(()), |what| Err((body.shape.span(), format!("`shape`: {what}"))))?;
+    }
+    for body in &scene.deformable {
+        let problem = body_problem(body.body.as_ref());
+        problem.map_or(Ok(()), |what| Err((body.body.span(), format!("`body`: {what}"))))?;
+        let material = body.material.as_ref().to_material().validate();
+        material.map_err(|what| (body.material.span(), format!("`material`: {what}")))?;
     }
     let deformable = |name: &str| scene.deformable.iter().any(|d| d.name.as_ref() == name);
     let rigid = |name: &str| scene.rigid.iter().any(|r| r.name.as_ref() == name);
@@ -356,6 +375,54 @@ fn check(scene: &Scene) -> Result<(), Mistake> {
         }
     }
     Ok(())
+}
+
+fn shape_problem(shape: &Shape) -> Option<String> {
+    let lengths: Vec<(&str, f32)> = match shape {
+        Shape::Ball { radius } => vec![("radius", *radius)],
+        Shape::Cuboid { half_extents } => half_extents.iter().map(|e| ("half_extents", *e)).collect(),
+        Shape::Capsule { half_height, radius }
+        | Shape::Cylinder { half_height, radius }
+        | Shape::Cone { half_height, radius } => vec![("half_height", *half_height), ("radius", *radius)],
+        Shape::HalfSpace { normal } => {
+            let zero = normal.iter().all(|n| *n == 0.0) || !normal.iter().all(|n| n.is_finite());
+            return zero.then(|| "`normal` must not be zero".into());
+        }
+    };
+    let wrong = lengths.into_iter().find(|(_, length)| !(*length > 0.0 && length.is_finite()));
+    wrong.map(|(key, length)| format!("`{key}` is {length}, but must be positive"))
+}
+
+fn body_problem(body: &Body) -> Option<String> {
+    match body {
+        Body::Lattice { half_extents, cells } => {
+            if cells.contains(&0) {
+                return Some(format!("`cells` is {cells:?}, but every axis needs at least one"));
+            }
+            shape_problem(&Shape::Cuboid { half_extents: *half_extents })
+        }
+        Body::Filled { shape, cell_size } => {
+            let wrong = !(*cell_size > 0.0 && cell_size.is_finite());
+            let size = wrong.then(|| format!("`cell_size` is {cell_size}, but must be positive"));
+            size.or_else(|| shape_problem(shape))
+        }
+        Body::Mesh { .. } => None,
+    }
+}
+
+impl Material {
+    pub fn to_material(&self) -> foible3d::DeformableMaterial {
+        foible3d::DeformableMaterial::new(self.youngs_modulus, self.poisson_ratio)
+            .density(self.density)
+            .friction(self.friction)
+            .restitution(self.restitution)
+            .mass_damping(self.mass_damping)
+            .stiffness_damping(self.stiffness_damping)
+            .elasticity(match self.elasticity {
+                Elasticity::LinearCorotated => foible3d::Elasticity::LinearCorotated,
+                Elasticity::Projective => foible3d::Elasticity::Projective,
+            })
+    }
 }
 
 fn unknown(name: &Spanned<String>, key: &str, what: &str, right: &[&str]) -> Mistake {

@@ -89,9 +89,18 @@ fn run(path: &Path, out: &Path) -> Result<usize, String> {
     trace.write_csv(&folder.join("trace.csv")).map_err(|e| e.to_string())?;
     trace.write_plot(&folder.join("plot.svg"), &name).map_err(|e| e.to_string())?;
     println!("\n  trace.csv and plot.svg are in {}", folder.display());
+    let aside: Vec<&str> = stage
+        .deformable
+        .iter()
+        .filter(|(_, body)| stage.world.bodies[*body].is_quarantined())
+        .map(|(name, _)| name.as_str())
+        .collect();
+    for name in &aside {
+        println!("  FAILED {name} was put aside: its state became non-finite");
+    }
     let verdicts =
         scene.expect.iter().zip(&results).map(|(expect, result)| verdict(expect, result.unwrap_or(f64::NAN)));
-    Ok(verdicts.filter(|met| !met).count())
+    Ok(aside.len() + verdicts.filter(|met| !met).count())
 }
 
 fn verdict(expect: &file::Expect, value: f64) -> bool {

@@ -3,7 +3,7 @@
 use super::elastic;
 use super::model::DeformableModel;
 use super::settings::SolverSettings;
-use super::state::DeformableState;
+use super::state::{ContactMemory, DeformableState};
 use crate::material::{DeformableMaterial, MaterialError};
 use crate::math::{Pose64, Vec3, from_real, to_real};
 use parry3d::bounding_volume::Aabb;
@@ -24,6 +24,14 @@ pub enum BodyError {
         vertex: usize,
         /// Number of vertices of the body.
         vertices: usize,
+    },
+    /// A state of another mesh.
+    #[error("the state has {vertices} vertices, the body {expected}")]
+    WrongSize {
+        /// Vertices of the state.
+        vertices: usize,
+        /// Vertices of the body.
+        expected: usize,
     },
     /// The vertex is not pinned.
     #[error("vertex {vertex} is not pinned")]
@@ -125,15 +133,19 @@ impl DeformableBody {
     /// Goes back to a saved state of this body.
     ///
     /// # Errors
-    /// [`BodyError::NoSuchVertex`] when the state belongs to a mesh of another size.
+    /// [`BodyError::WrongSize`] when the state belongs to a mesh of another size.
     pub fn restore(&mut self, state: DeformableState) -> Result<(), BodyError> {
         if state.x.len() != self.state.x.len() {
-            return Err(BodyError::NoSuchVertex {
-                vertex: state.x.len().max(1) - 1,
-                vertices: self.state.x.len(),
-            });
+            return Err(BodyError::WrongSize { vertices: state.x.len(), expected: self.state.x.len() });
         }
         self.state = state;
+        // Contacts of another mesh of the same size would name nodes that are not on this surface.
+        let surface = &self.model.surface.index_of_node;
+        let known = |n: &u32| surface.get(*n as usize).is_some_and(|s| *s != u32::MAX);
+        let on_surface = |c: &ContactMemory| c.nodes.iter().zip(c.weights).all(|(n, w)| w == 0.0 || known(n));
+        if !self.state.contacts.iter().all(on_surface) {
+            self.state.contacts.clear();
+        }
         Ok(())
     }
 
@@ -495,7 +507,8 @@ impl DeformableBody {
         self.report.residual <= self.report.tolerance
     }
 
-    /// How often the last step had to be shortened because it would have raised the energy.
+    /// How often the last step had to be done again because it would have raised the energy: without the quasi-Newton
+    /// update, or with a scaled metric.
     pub fn last_guard_retries(&self) -> usize {
         self.report.guard_retries
     }

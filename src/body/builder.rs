@@ -1,6 +1,6 @@
 //! Builder of deformable bodies, after rapier's own builders.
 
-use super::body::{BodyError, DeformableBody};
+use super::body::DeformableBody;
 use super::model::DeformableModel;
 use super::settings::SolverSettings;
 use crate::error::DeformableBodyError;
@@ -143,7 +143,7 @@ impl DeformableBodyBuilder {
         self
     }
 
-    /// Sets the factor on gravity.
+    /// Sets the factor on gravity; a non-finite one is taken as zero.
     pub fn gravity_scale(mut self, scale: f64) -> Self {
         self.gravity_scale = scale;
         self
@@ -185,11 +185,6 @@ impl DeformableBodyBuilder {
     /// What is wrong with the mesh or the material, or a pose or velocity that is not finite.
     pub fn build(&self) -> Result<DeformableBody, DeformableBodyError> {
         self.material.validate()?;
-        if !self.gravity_scale.is_finite() {
-            let value = Vector::splat(self.gravity_scale as f32);
-            let quantity = "gravity scale";
-            return Err(BodyError::NotFinite { quantity, value }.into());
-        }
         let mut body = DeformableBody::new(self.model.clone()?, self.material);
         body.teleport(self.pose)?;
         body.set_vels(self.linvel, self.angvel)?;

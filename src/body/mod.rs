@@ -19,4 +19,4 @@ pub use model::DeformableModel;
 pub use set::{DeformableBodyHandle, DeformableBodySet};
 pub use settings::{Acceleration, Frames, SolverSettings, SystemMatrix};
 pub use state::DeformableState;
-pub(crate) use state::{ContactKey, ContactMemory};
+pub(crate) use state::{ContactKey, ContactMemory, is_number};

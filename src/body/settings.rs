@@ -5,7 +5,8 @@
 #[non_exhaustive]
 pub enum SystemMatrix {
     /// `M/h² + K₀` with the linear stiffness K₀ of the rest shape, 3n×3n, applied in rotating
-    /// [`Frames`]. Right at one to three iterations; the default.
+    /// [`Frames`]. The default: stiff bodies are right at one
+    /// iteration, bending ones at five to ten.
     #[default]
     RestStiffness,
     /// `M/h² + Σ w V GᵀG`, the n×n matrix of classical Projective Dynamics [Bouaziz et al. 2014].
@@ -34,8 +35,8 @@ pub enum Frames {
 pub enum Acceleration {
     /// The plain iteration.
     None,
-    /// Limited-memory BFGS on top of the constant matrix [Liu et al. 2017], the default: bending
-    /// bodies need half the iterations.
+    /// Limited-memory BFGS on top of the constant matrix [Liu et al. 2017], the default: pays from
+    /// about five iterations up.
     Lbfgs {
         /// Pairs kept, 1 to 16.
         window: usize,
@@ -56,7 +57,8 @@ pub struct SolverSettings {
     pub system: SystemMatrix,
     /// Frames of the rest stiffness.
     pub frames: Frames,
-    /// Global iterations at the most, at least one.
+    /// Global iterations at the most, at least one. Bodies that touch one rigid body are solved together:
+    /// the largest limit among them counts.
     pub max_iterations: usize,
     /// Iterate until the largest residual force is below this fraction of the largest force on a
     /// node (weight, internal or contact force, whichever is largest).

@@ -2,7 +2,8 @@
 
 use crate::math::Vec3;
 
-/// All that a snapshot of a body has to hold. A body restored from it goes on with the same bits.
+/// What the motion of a body changes: what a snapshot has to hold beside the user's own settings (pins,
+/// forces, material). A body restored from it goes on with the same bits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeformableState {
     /// Node positions \[m\].
@@ -40,10 +41,18 @@ pub(crate) struct ContactMemory {
     pub weights: [f64; 3],
 }
 
+/// Farther than this [m], or faster [m/s], is no number to rapier: its `f32` overflows in squares.
+const FARTHEST: f64 = 1.0e15;
+
+/// Whether a position or velocity is one that a step can go on from.
+pub(crate) fn is_number(v: &Vec3) -> bool {
+    v.iter().all(|c| c.abs() < FARTHEST)
+}
+
 impl DeformableState {
+    /// Whether a step can go on from it.
     pub(crate) fn is_finite(&self) -> bool {
-        let finite = |list: &[Vec3]| list.iter().all(|p| p.iter().all(|c| c.is_finite()));
-        finite(&self.x) && finite(&self.v)
+        self.x.iter().chain(&self.v).all(is_number)
     }
 
     /// The contact of the last step with this key.

@@ -25,7 +25,7 @@ const SHIFT: f64 = 0.1;
 /// Part of the body's size within which a projection's direction is not trusted.
 const BAND: f64 = 1.0e-4;
 /// Slot of the first closest point on a feature; those before are nodes, rims and corners.
-const FIRST_POINT: u32 = 1;
+const FIRST_POINT: u32 = 2;
 
 /// Finds contacts; holds the memory it needs between calls.
 #[derive(Default)]
@@ -158,7 +158,10 @@ impl Detector {
                 if let Some((t, found)) = crossing.filter(|(_, f)| f.gap < reach) {
                     self.edges[e] = Some(found);
                     let nodes = [edge[inner], edge[outer], 0];
-                    rows.push(scene.row(nodes, [1.0 - t, t, 0.0], &found, scene.edge_feature(e)));
+                    let mut row = scene.row(nodes, [1.0 - t, t, 0.0], &found, scene.edge_feature(e));
+                    // Draped over an edge of the obstacle, one edge of the body crosses two rims.
+                    row.key.slot = inner as u32;
+                    rows.push(row);
                 }
             }
         }
@@ -201,6 +204,10 @@ impl Detector {
         self.points.clear();
         for kept in memory.iter().filter(|m| m.key.slot >= FIRST_POINT) {
             let s = kept.nodes.map(|n| surface.index_of_node[n as usize] as usize);
+            // A restored state may be another mesh's.
+            if s.iter().any(|s| *s >= self.local.len()) {
+                continue;
+            }
             let [a, b, c] = s.map(|s| self.local[s]);
             let p = a * kept.weights[0] + b * kept.weights[1] + c * kept.weights[2];
             let outward = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();

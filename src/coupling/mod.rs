@@ -1,7 +1,7 @@
 //! Rapier's sets, read into obstacles and partners, and the reactions written back.
 //!
-//! Architecture invariant: the only room that knows rapier's sets and handles. Everything below it
-//! works on obstacles, partners and rows.
+//! Architecture invariant: the only room that reads and writes rapier's sets; `pipeline` passes them on.
+//! Everything below works on obstacles, partners and rows.
 
 mod obstacles;
 mod reactions;

@@ -9,7 +9,7 @@ use parry3d::shape::{SharedShape, TypedShape};
 use rapier3d::dynamics::{
     CoefficientCombineRule, RigidBody, RigidBodyHandle, RigidBodyMassProps, RigidBodyType,
 };
-use rapier3d::geometry::{Collider, ColliderHandle, InteractionGroups};
+use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet, InteractionGroups};
 use rapier3d::math::Vector;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -27,6 +27,8 @@ pub(crate) struct RapierScene {
     /// Heightfields as triangle meshes, which project points faster. The field is kept too, so
     /// that its address stays its own.
     meshes: HashMap<usize, (SharedShape, SharedShape)>,
+    /// Heightfields that this step has seen.
+    seen: Vec<usize>,
 }
 
 impl RapierScene {
@@ -37,6 +39,7 @@ impl RapierScene {
         self.handles.clear();
         self.colliders.clear();
         self.partner_of_body.clear();
+        self.seen.clear();
         for (handle, collider) in sets.colliders.iter() {
             if !collider.is_enabled() || collider.is_sensor() {
                 continue;
@@ -62,6 +65,8 @@ impl RapierScene {
             };
             self.push_shape(handle, partner, collider.shared_shape().clone(), start, end);
         }
+        let seen = &self.seen;
+        self.meshes.retain(|address, _| seen.contains(address));
     }
 
     /// The collider that an obstacle's key names.
@@ -121,6 +126,7 @@ impl RapierScene {
             }
             TypedShape::HeightField(field) => {
                 let address = Arc::as_ptr(&shape.0).cast::<()>() as usize;
+                self.seen.push(address);
                 let (_, mesh) = self.meshes.entry(address).or_insert_with(|| {
                     let (vertices, triangles) = field.to_trimesh();
                     let mesh = SharedShape::trimesh(vertices, triangles);
@@ -156,7 +162,8 @@ pub(crate) fn combined(body: &DeformableBody, collider: &Collider) -> Option<(f6
         body.restitution_combine_rule(),
         material.restitution_combine_rule,
     );
-    Some((friction.max(0.0), restitution.clamp(0.0, 1.0)))
+    // Beyond this no slope is left to slide on; infinity times zero would be no number.
+    Some((friction.clamp(0.0, 1e4), restitution.clamp(0.0, 1.0)))
 }
 
 fn partner_of(
@@ -179,7 +186,7 @@ fn partner_of(
             prescribed(Pose64::from_real(&body.predict_position_using_velocity(dt as f32)))
         }
         _ => {
-            let masses = current_mass_properties(sets, body);
+            let masses = current_mass_properties(sets.colliders, body);
             let inertia = masses.effective_world_inv_inertia;
             let inv_inertia = Mat3::new(
                 inertia.m11.into(),
@@ -209,13 +216,12 @@ fn partner_of(
     }
 }
 
-/// Mass properties at the current pose. Rapier brings its own up to date only within a step, so
-/// after an insertion or a teleport they are old.
-fn current_mass_properties(sets: RapierSets<'_>, body: &RigidBody) -> RigidBodyMassProps {
+/// Mass properties at the current pose: a body's are zero until rapier's first step with its colliders.
+pub(super) fn current_mass_properties(colliders: &ColliderSet, body: &RigidBody) -> RigidBodyMassProps {
     let mut masses = body.mass_properties().clone();
     if masses.local_mprops.inv_mass == 0.0 {
         let mut copy = body.clone();
-        copy.recompute_mass_properties_from_colliders(sets.colliders);
+        copy.recompute_mass_properties_from_colliders(colliders);
         masses = copy.mass_properties().clone();
     }
     masses.update_world_mass_properties(body.body_type(), body.position());

@@ -4,10 +4,11 @@
 //! it gets the *impulse* h·(f_ext + reaction) and the *force* −f_ext for the coming step: its substeps
 //! then find nothing to accelerate it. The user's force is put back afterwards.
 
-use super::obstacles::external_force;
-use crate::math::to_real;
-use crate::solver::Reaction;
+use super::obstacles::{RapierScene, current_mass_properties, external_force};
+use crate::math::{from_real, to_real};
+use crate::solver::{Partner, Reaction};
 use rapier3d::dynamics::{RigidBodyHandle, RigidBodySet};
+use rapier3d::geometry::ColliderSet;
 use rapier3d::math::Vector;
 
 /// Forces that were replaced for the duration of rapier's step.
@@ -27,34 +28,38 @@ struct Replaced {
 }
 
 impl Reactions {
-    /// Hands over the reactions of a step of `dt` \[s\]. `handles[i]` is the body of `reactions[i]`.
+    /// Hands over the reactions of a step of `dt` \[s\] to the bodies of the scene. Velocities are changed
+    /// by the inverse masses that the solve used: rapier's own are zero before its first step.
     pub fn write(
         &mut self,
         bodies: &mut RigidBodySet,
+        colliders: &ColliderSet,
         gravity: Vector,
         dt: f32,
-        handles: &[Option<RigidBodyHandle>],
+        scene: &RapierScene,
         reactions: &[Reaction],
     ) {
         self.replaced.clear();
-        for (handle, reaction) in handles.iter().zip(reactions) {
-            let Some(handle) = handle.filter(|_| reaction.touched) else {
+        for ((handle, partner), reaction) in scene.handles.iter().zip(&scene.partners).zip(reactions) {
+            let (Some(handle), Partner::Rigid { inv_mass, inv_inertia, .. }) = (*handle, partner) else {
                 continue;
             };
-            if !bodies.get(handle).is_some_and(|b| b.is_dynamic()) {
+            let Some(body) = bodies.get(handle).filter(|_| reaction.touched) else { continue };
+            let masses = current_mass_properties(colliders, body);
+            let (force, torque) = (body.user_force(), body.user_torque());
+            let external = external_force(body, &masses, gravity);
+            let h = f64::from(dt);
+            let impulse = reaction.impulse + from_real(external) * h;
+            let torque_impulse = reaction.torque_impulse + from_real(torque) * h;
+            let linvel = to_real(&(from_real(body.linvel()) + inv_mass.component_mul(&impulse)));
+            let angvel = to_real(&(from_real(body.angvel()) + inv_inertia * torque_impulse));
+            // A reaction that f32 cannot hold would put NaN into the user's world.
+            if !(linvel.is_finite() && angvel.is_finite()) {
                 continue;
             }
-            let impulse = to_real(&reaction.impulse);
-            let torque_impulse = to_real(&reaction.torque_impulse);
-            let Some(body) =
-                bodies.get_mut(handle).filter(|_| impulse.is_finite() && torque_impulse.is_finite())
-            else {
-                continue;
-            };
-            let (force, torque) = (body.user_force(), body.user_torque());
-            let external = external_force(body, body.mass_properties(), gravity);
-            body.apply_impulse(external * dt + impulse, true);
-            body.apply_torque_impulse(torque * dt + torque_impulse, true);
+            let Some(body) = bodies.get_mut(handle) else { continue };
+            body.set_linvel(linvel, true);
+            body.set_angvel(angvel, true);
             body.add_force(-external, true);
             body.add_torque(-torque, true);
             self.replaced.push(Replaced {

@@ -4,8 +4,8 @@ use super::surface::{EdgeUse, boundary_triangles, edge_uses};
 use super::tet_mesh::{MeshError, TetMesh};
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::Vector;
-use parry3d::shape::{Shape, TypedShape};
-use parry3d::transformation::{VolumeMeshParameters, volume_mesh};
+use parry3d::shape::{Ball, Shape, SupportMap, TypedShape};
+use parry3d::transformation::{VolumeMeshParameters, convex_hull, volume_mesh};
 
 /// Subdivisions of a full circle when a curved shape is turned into triangles.
 const CIRCLE: u32 = 24;
@@ -20,20 +20,21 @@ const MAX_CELLS: f32 = 256.0;
 
 impl TetMesh {
     /// Fills a closed, outward-wound triangle surface with tetrahedra of about `cell_size` \[m\]
-    /// (parry's lattice cover, pulled towards the surface). The result contains the surface, so it
-    /// is larger than the shape by a fraction of a cell.
+    /// (parry's lattice cover, pulled towards the surface). The result covers the surface to within a
+    /// fraction of a cell.
     ///
     /// # Errors
     /// [`MeshError::BadCellSize`], [`MeshError::NothingEnclosed`] for an open or empty surface,
-    /// [`MeshError::IndexOutOfRange`] for a bad index.
+    /// [`MeshError::TriangleOutOfRange`] for a bad index.
     pub fn fill_surface(
         vertices: &[Vector],
         triangles: &[[u32; 3]],
         cell_size: f32,
     ) -> Result<Self, MeshError> {
-        for (tet, &vertex) in triangles.iter().flatten().enumerate() {
+        for (k, &vertex) in triangles.iter().flatten().enumerate() {
             if vertex as usize >= vertices.len() {
-                return Err(MeshError::IndexOutOfRange { tet: tet / 3, vertex, vertices: vertices.len() });
+                let (triangle, vertices) = (k / 3, vertices.len());
+                return Err(MeshError::TriangleOutOfRange { triangle, vertex, vertices });
             }
         }
         if let Some(vertex) = vertices.iter().position(|v| !v.is_finite()) {
@@ -72,8 +73,8 @@ impl TetMesh {
     /// Fills one of parry's shapes with tetrahedra of about `cell_size` \[m\].
     ///
     /// # Errors
-    /// [`MeshError::NotFillable`] for shapes without a closed surface (half-spaces, heightfields,
-    /// segments, triangles), else as [`TetMesh::fill_surface`].
+    /// [`MeshError::NotFillable`] for shapes that enclose nothing (half-spaces, heightfields, segments,
+    /// triangles) and for compounds and voxels, else as [`TetMesh::fill_surface`].
     pub fn fill_shape(shape: &dyn Shape, cell_size: f32) -> Result<Self, MeshError> {
         let (vertices, triangles) = match shape.as_typed_shape() {
             TypedShape::Ball(s) => s.to_trimesh(CIRCLE, CIRCLE / 2),
@@ -83,13 +84,23 @@ impl TetMesh {
             TypedShape::Cone(s) => s.to_trimesh(CIRCLE),
             TypedShape::ConvexPolyhedron(s) => s.to_trimesh(),
             TypedShape::TriMesh(s) => (s.vertices().to_vec(), s.indices().to_vec()),
-            _ => {
-                let shape = format!("{:?}", shape.shape_type());
-                return Err(MeshError::NotFillable { shape });
-            }
+            _ => match shape.as_support_map() {
+                Some(convex) if shape.mass_properties(1.0).mass() > 0.0 => hull_of(convex),
+                _ => {
+                    let shape = format!("{:?}", shape.shape_type());
+                    return Err(MeshError::NotFillable { shape });
+                }
+            },
         };
         Self::fill_surface(&vertices, &triangles, cell_size)
     }
+}
+
+/// The hull of a convex shape's extreme points in many directions.
+fn hull_of(shape: &dyn SupportMap) -> (Vec<Vector>, Vec<[u32; 3]>) {
+    let (directions, _) = Ball::new(1.0).to_trimesh(CIRCLE, CIRCLE / 2);
+    let points: Vec<Vector> = directions.iter().map(|d| shape.local_support_point(*d)).collect();
+    convex_hull(&points)
 }
 
 /// Removes tetrahedra where the boundary branches: cells of the cover that meet in nothing but an
@@ -132,10 +143,15 @@ fn signed_volume_of(vertices: &[Vector], triangles: &[[u32; 3]]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use parry3d::shape::{Ball, Capsule, Cone, Cuboid, Cylinder, HalfSpace};
+    use parry3d::shape::{Capsule, Cone, Cuboid, Cylinder, HalfSpace, RoundShape};
 
     #[test]
     fn filled_shapes_contain_their_volume_and_little_more() {
+        let round = RoundShape { inner_shape: Cuboid::new(Vector::splat(0.3)), border_radius: 0.1 };
+        // A box of half extent a under a border r: its volume is (2a)³ + 6(2a)²r + 6aπr² + 4πr³/3, which
+        // parry's mass properties leave the border out of.
+        let filled = TetMesh::fill_shape(&round, 0.1).unwrap().volume() / 0.4927;
+        assert!((0.97..1.35).contains(&filled), "round cuboid: {filled}");
         let shapes: [(&dyn Shape, f32); 5] = [
             (&Ball::new(0.5), 0.1),
             (&Cuboid::new(Vector::new(0.5, 0.3, 0.2)), 0.1),

@@ -33,6 +33,16 @@ pub enum MeshError {
         /// Number of vertices.
         vertices: usize,
     },
+    /// A triangle of a surface to be filled points outside the vertex list.
+    #[error("triangle {triangle} refers to vertex {vertex}, but there are {vertices} vertices")]
+    TriangleOutOfRange {
+        /// Index of the triangle.
+        triangle: usize,
+        /// The index it holds.
+        vertex: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
     /// A tetrahedron names one vertex twice.
     #[error("tetrahedron {tet} uses vertex {vertex} twice")]
     RepeatedVertex {
@@ -111,8 +121,8 @@ pub enum MeshError {
         /// Requested cell size \[m\].
         cell_size: f32,
     },
-    /// A shape without a closed surface.
-    #[error("a shape of type {shape} has no closed surface to fill")]
+    /// A shape that cannot be filled.
+    #[error("a shape of type {shape} is not one that can be filled with tetrahedra")]
     NotFillable {
         /// Name of the shape's type.
         shape: String,

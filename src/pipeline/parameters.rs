@@ -31,9 +31,10 @@ impl Default for DeformableParameters {
 impl DeformableParameters {
     pub(crate) fn contact_limits(&self) -> ContactLimits {
         ContactLimits {
-            recovery_speed: self.max_corrective_velocity,
-            restitution_threshold: self.restitution_threshold,
-            tolerance: self.contact_tolerance,
+            recovery_speed: self.max_corrective_velocity.max(0.0),
+            restitution_threshold: self.restitution_threshold.max(0.0),
+            // Below 1e-12 there is only rounding; NaN becomes that too.
+            tolerance: self.contact_tolerance.max(1e-12),
         }
     }
 }
@@ -58,7 +59,7 @@ pub struct DeformableCounters {
     pub iterations: usize,
     /// Bodies that stopped at their iteration limit, above their tolerance.
     pub not_converged: usize,
-    /// Times the guard had to scale the metric.
+    /// Times the guard had an iteration done again.
     pub guard_retries: usize,
     /// Newton steps of the contact problems.
     pub newton_steps: usize,

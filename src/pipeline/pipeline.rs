@@ -2,19 +2,19 @@
 //!
 //! ```text
 //! read_obstacles → predict → detect → prepare_factors → form_islands → solve → advance
-//! → write_reactions → (rapier steps) → take_back_reactions
+//! → write_reactions → (rapier steps) → after_step
 //! ```
 
 use super::contacts::DeformableContact;
 use super::parameters::{DeformableCounters, DeformableParameters};
 use super::threads::for_each;
 use super::work::{BodyWork, IslandWork};
-use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet};
+use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, is_number};
 use crate::contact::{Candidates, Side};
 use crate::coupling::{RapierScene, RapierSets, Reactions};
 use crate::error::DeformableBodyError;
 use crate::math::{Vec3, from_real, to_real};
-use crate::solver::{FactorCache, FactorKey, Reaction};
+use crate::solver::{FactorCache, FactorKey, ROUNDING, Reaction};
 use rapier3d::dynamics::{MultibodyJointSet, RigidBodySet};
 use rapier3d::geometry::ColliderSet;
 use rapier3d::math::Vector;
@@ -61,6 +61,8 @@ impl DeformablePipeline {
     ) {
         self.counters = DeformableCounters::default();
         self.contacts.clear();
+        // If the last step was not ended by `after_step`, the users' forces are still ours to return.
+        self.reactions.take_back(bodies);
         if !(dt.is_finite() && dt > 0.0 && gravity.is_finite()) {
             self.counters.skipped = true;
             return;
@@ -78,7 +80,7 @@ impl DeformablePipeline {
         self.solve(parameters, h);
         self.counters.solve_time = clock.lap();
         self.advance(deformables, h);
-        self.write_reactions(bodies, gravity, dt);
+        self.write_reactions(bodies, colliders, gravity, dt);
         self.counters.advance_time = clock.lap();
     }
 
@@ -149,16 +151,22 @@ impl DeformablePipeline {
         self.counters.contacts = self.works.iter().map(|w| w.rows.len()).sum();
     }
 
-    fn prepare_factors(&mut self, deformables: &DeformableBodySet, h: f64, column_budget: usize) {
+    fn prepare_factors(&mut self, deformables: &mut DeformableBodySet, h: f64, column_budget: usize) {
         self.factors.begin_step(column_budget);
-        for work in &self.works {
-            let Some(problem) = &work.problem else { continue };
-            let body = &deformables[work.handle];
-            let done = self.factors.prepare(&problem.key, body, h, work.touched_nodes());
-            let done = done.unwrap_or_default();
-            self.counters.factorizations += done.factorizations;
-            self.counters.columns += done.columns;
-        }
+        let (factors, counters) = (&mut self.factors, &mut self.counters);
+        self.works.retain(|work| {
+            let (Some(problem), Some(body)) = (&work.problem, deformables.get_mut(work.handle)) else {
+                return false;
+            };
+            // Numbers beyond what double precision can factor: stiffness over inertia of 1e15 and more.
+            let Some(done) = factors.prepare(&problem.key, body, h, work.touched_nodes()) else {
+                quarantine(body, counters);
+                return false;
+            };
+            counters.factorizations += done.factorizations;
+            counters.columns += done.columns;
+            true
+        });
         self.counters.factor_bytes = self.factors.factor_bytes();
         self.counters.column_bytes = self.factors.column_bytes();
     }
@@ -232,8 +240,8 @@ impl DeformablePipeline {
                 let Some(body) = deformables.get_mut(handle) else { continue };
                 if finite {
                     store(body, work, local, h, &mut self.counters);
-                } else if !work.island.bodies[local].current.x.iter().all(|x| x.iter().all(|c| c.is_finite()))
-                    || work.island.report.unsolvable
+                } else if work.island.report.unsolvable
+                    || !work.island.bodies[local].current.x.iter().all(is_number)
                 {
                     quarantine(body, &mut self.counters);
                 }
@@ -252,12 +260,18 @@ impl DeformablePipeline {
         self.idle.extend(self.works.drain(..).map(|work| (work.handle, work)));
     }
 
-    fn write_reactions(&mut self, bodies: &mut RigidBodySet, gravity: Vector, dt: f32) {
-        self.reactions.write(bodies, gravity, dt, &self.scene.handles, &self.reaction_list);
+    fn write_reactions(
+        &mut self,
+        bodies: &mut RigidBodySet,
+        colliders: &ColliderSet,
+        gravity: Vector,
+        dt: f32,
+    ) {
+        self.reactions.write(bodies, colliders, gravity, dt, &self.scene, &self.reaction_list);
     }
 }
 
-/// Puts a body aside whose state is not finite; it stays where it last was.
+/// Puts a body aside whose state is not finite, or would become so: its step is not taken.
 fn quarantine(body: &mut DeformableBody, counters: &mut DeformableCounters) {
     body.set_enabled(false);
     body.report.quarantined = true;
@@ -284,7 +298,7 @@ fn store(
     work.memory_of(local, h, &mut body.state.contacts);
     body.report.iterations = work.island.report.iterations;
     body.report.residual = problem.residual();
-    body.report.tolerance = problem.settings.tolerance * problem.force_scale();
+    body.report.tolerance = problem.settings.tolerance.max(ROUNDING) * problem.force_scale();
     body.report.guard_retries = problem.guard_retries;
     counters.guard_retries += problem.guard_retries;
     counters.not_converged += usize::from(!body.last_converged());

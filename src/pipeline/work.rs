@@ -1,6 +1,6 @@
 //! What the pipeline keeps per body from step to step: memory only, nothing that results depend on.
 
-use crate::body::{ContactMemory, DeformableBody, DeformableBodyHandle};
+use crate::body::{ContactMemory, DeformableBody, DeformableBodyHandle, is_number};
 use crate::contact::{Candidates, Detector, Pair, Row, Side};
 use crate::coupling::{RapierScene, RapierSets, combined};
 use crate::math::Vec3;
@@ -98,9 +98,8 @@ pub(super) struct IslandWork {
 impl IslandWork {
     /// Whether every number that leaves the island is finite.
     pub fn is_finite(&self) -> bool {
-        let finite = |v: &Vec3| v.iter().all(|c| c.is_finite());
         !self.island.report.unsolvable
-            && self.island.bodies.iter().all(|b| b.current.x.iter().all(finite))
+            && self.island.bodies.iter().all(|b| b.current.x.iter().all(is_number))
             && self.island.contacts.lambda.iter().all(|l| l.is_finite())
     }
 

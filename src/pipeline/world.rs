@@ -64,6 +64,9 @@ impl DeformableWorld {
 
     /// Makes factors and contact columns for the coming steps ahead of time, so that a first touch
     /// takes no longer than a later one.
+    ///
+    /// # Errors
+    /// [`DeformableBodyError::TimeStep`] if the world's `dt` is not positive and finite.
     pub fn prepare(&mut self, physics: &PhysicsWorld) -> Result<(), DeformableBodyError> {
         self.pipeline.prepare(&self.bodies, physics.integration_parameters.dt)
     }
@@ -117,5 +120,29 @@ impl DeformableWorld {
     /// What the last step did, and how long it took.
     pub fn counters(&self) -> &DeformableCounters {
         self.pipeline.counters()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_state_that_is_no_number_is_quarantined_until_it_is_enabled_again() {
+        let mut physics = PhysicsWorld::new();
+        let mut world = DeformableWorld::new();
+        let cube = || DeformableBodyBuilder::cuboid(Vector::splat(0.2), [2, 2, 2]);
+        let (bad, good) = (world.insert(cube()).unwrap(), world.insert(cube()).unwrap());
+        let sound = world.bodies[bad].state().clone();
+        world.bodies[bad].state.x[3].y = f64::NAN;
+        world.step(&mut physics);
+        assert_eq!(world.counters().quarantined, 1);
+        assert!(world.bodies[bad].is_quarantined() && !world.bodies[good].is_quarantined());
+        world.step(&mut physics);
+        assert_eq!((world.counters().quarantined, world.counters().bodies), (0, 1));
+        world.bodies[bad].restore(sound).unwrap();
+        world.bodies[bad].set_enabled(true);
+        world.step(&mut physics);
+        assert!(!world.bodies[bad].is_quarantined() && world.counters().bodies == 2);
     }
 }

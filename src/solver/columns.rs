@@ -49,7 +49,7 @@ impl Columns {
                     batch[n * (d * k + c) + d * nodes[s as usize] as usize + c] = 1.0;
                 }
             }
-            symbolic.solve(factor, &mut batch, BATCH, scratch);
+            symbolic.solve_batch(factor, &mut batch, BATCH, scratch);
             for (k, &s) in chunk.iter().enumerate() {
                 // A pinned node does not move: its column is zero, not that of its identity row.
                 if pins.binary_search(&nodes[s as usize]).is_ok() {

@@ -42,8 +42,9 @@ pub(crate) struct ConeWork {
 const EPSILON: f64 = 1.0e-4;
 /// Newton steps that a warm start may take before the ladder is climbed.
 const WARM_STEPS: usize = 4;
-/// What `λ − γ(λ)` is worth at the start: gaps that are off by δ move γ by δ/R, forces by δ/W only.
-const AS_GOOD: f64 = 1.0 / EPSILON;
+/// Forces are left as they are at the start if they are no worse than the tolerance times this. A
+/// hundred times more, and a symmetric stack of 1000:1 begins to sway.
+const AS_GOOD: f64 = 100.0;
 /// Newton steps on a rung of the ladder.
 const RUNG_STEPS: usize = 40;
 /// Rungs tried when warm start and short ladder failed.
@@ -150,7 +151,7 @@ impl ConeSolver {
         (0..problem.contacts()).all(|i| {
             let rows = problem.offsets[i]..problem.offsets[i + 1];
             let error = largest(rows.map(|k| lambda[k] - self.gamma[k]));
-            error <= AS_GOOD * tolerance.relative * scale
+            error.is_finite() && error <= AS_GOOD * tolerance.relative * scale
         })
     }
 
@@ -170,7 +171,7 @@ impl ConeSolver {
         for step in 0..=steps {
             let error = largest(z.iter().zip(&self.gamma).map(|(z, g)| z - g));
             let scale = largest(self.gamma.iter().copied()).max(tolerance.floor);
-            done = error <= tolerance.relative * scale;
+            done = error.is_finite() && error <= tolerance.relative * scale;
             if done || step == steps || !error.is_finite() {
                 break;
             }

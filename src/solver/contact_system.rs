@@ -1,6 +1,7 @@
 //! The contacts of an island as a cone problem: `W = J P Jᵀ + h² J M⁻¹ Jᵀ`, gaps, warm starts.
 //!
-//! `W` and the directions stay fixed within a step; gaps are taken anew in every iteration.
+//! Directions stay fixed within a step, and W unless a body's frame or scaling changes; gaps are taken
+//! anew in every iteration.
 
 use super::body_problem::BodyProblem;
 use super::cone_newton::{ConeProblem, ConeSolver, ConeTolerance, ConeWork};
@@ -27,8 +28,6 @@ pub(crate) struct ContactSystem {
     slips: Vec<f64>,
     before: Vec<f64>,
     reactions: Vec<Reaction>,
-    /// Forces and shifts before the iteration.
-    kept: (Vec<f64>, Vec<f64>),
     /// What W was made of, and memory for what it is to be made of next.
     made_from: Ingredients,
     fresh: Ingredients,
@@ -241,20 +240,6 @@ impl ContactSystem {
                 }
             }
         }
-    }
-
-    /// Remembers the forces for [`ContactSystem::revert`].
-    pub fn keep(&mut self) {
-        self.kept.0.clone_from(&self.lambda);
-        self.kept.1.clone_from(&self.shift);
-    }
-
-    /// Goes back to the forces that were kept.
-    pub fn revert(&mut self, bodies: &mut [BodyProblem]) {
-        self.lambda.clone_from(&self.kept.0);
-        self.shift.clone_from(&self.kept.1);
-        self.problem.multiply(&self.lambda, &mut self.slips);
-        self.lay_forces(bodies);
     }
 
     /// Force \[N\] of contact `i` on its side 0.

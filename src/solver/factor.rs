@@ -3,10 +3,13 @@
 //! All solves are sequential (`Par::Seq`): faer's threads cost more than small supernodes are
 //! worth, and parallelism is over bodies. Everything works in memory the caller owns.
 
+use super::triangular::Supernodes;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
+use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, MatRef, Par, Side, Spec};
@@ -20,6 +23,9 @@ pub(crate) const BATCH: usize = 24;
 pub(crate) struct Symbolic {
     pattern: SymbolicSparseColMat<usize>,
     cholesky: SymbolicCholesky<usize>,
+    supernodes: Supernodes,
+    /// Old index at each new place.
+    order: Vec<usize>,
 }
 
 /// A numeric factor `A = L Lᵀ`.
@@ -33,6 +39,8 @@ pub(crate) struct Factor {
 pub(crate) struct FactorScratch {
     buffer: Option<MemBuffer>,
     bytes: usize,
+    ordered: Vec<f64>,
+    gathered: Vec<f64>,
 }
 
 /// The matrix is not positive definite, or not finite.
@@ -49,9 +57,15 @@ impl Symbolic {
             pattern.as_ref(),
             Side::Upper,
             SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
+            CholeskySymbolicParams {
+                supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+                ..Default::default()
+            },
         );
-        Some(Self { pattern, cholesky: cholesky.ok()? })
+        let cholesky = cholesky.ok()?;
+        let supernodes = supernodes_of(&cholesky);
+        let order = cholesky.perm().map(|p| p.arrays().0.to_vec())?;
+        Some(Self { pattern, cholesky, supernodes, order })
     }
 
     pub fn column_starts(&self) -> &[usize] {
@@ -91,7 +105,20 @@ impl Symbolic {
     }
 
     /// Solves `A X = B` in place; `rhs` holds the columns of B one after the other.
-    pub fn solve(&self, factor: &Factor, rhs: &mut [f64], columns: usize, scratch: &mut FactorScratch) {
+    pub fn solve(&self, factor: &Factor, rhs: &mut [f64], scratch: &mut FactorScratch) {
+        let FactorScratch { ordered, gathered, .. } = scratch;
+        for column in rhs.chunks_exact_mut(self.order.len()) {
+            ordered.clear();
+            ordered.extend(self.order.iter().map(|&old| column[old]));
+            self.supernodes.solve(&factor.values, ordered, gathered);
+            for (&old, x) in self.order.iter().zip(ordered.iter()) {
+                column[old] = *x;
+            }
+        }
+    }
+
+    /// As [`Symbolic::solve`], for many columns at once.
+    pub fn solve_batch(&self, factor: &Factor, rhs: &mut [f64], columns: usize, scratch: &mut FactorScratch) {
         let n = self.cholesky.nrows();
         let need = self.cholesky.solve_in_place_scratch::<f64>(columns, Par::Seq);
         LltRef::new(&self.cholesky, &factor.values).solve_in_place_with_conj(
@@ -101,6 +128,34 @@ impl Symbolic {
             scratch.stack(need.unaligned_bytes_required()),
         );
     }
+}
+
+/// Where faer keeps the columns of a factor. A factor without structure to speak of is simplicial:
+/// every column is a supernode of its own then.
+fn supernodes_of(cholesky: &SymbolicCholesky<usize>) -> Supernodes {
+    let n = cholesky.nrows();
+    let mut supernodes = Supernodes { row_begin: vec![0], ..Supernodes::default() };
+    match cholesky.raw() {
+        SymbolicCholeskyRaw::Supernodal(raw) => {
+            supernodes.begin.extend_from_slice(&raw.supernode_begin()[..raw.n_supernodes()]);
+            supernodes.value_begin.extend_from_slice(raw.col_ptr_for_val());
+            for s in 0..raw.n_supernodes() {
+                supernodes.rows.extend_from_slice(raw.supernode(s).pattern());
+                supernodes.row_begin.push(supernodes.rows.len());
+            }
+        }
+        SymbolicCholeskyRaw::Simplicial(raw) => {
+            supernodes.begin.extend(0..n);
+            supernodes.value_begin.extend_from_slice(raw.col_ptr());
+            for column in raw.col_ptr().windows(2) {
+                // The diagonal stands first.
+                supernodes.rows.extend_from_slice(&raw.row_idx()[column[0] + 1..column[1]]);
+                supernodes.row_begin.push(supernodes.rows.len());
+            }
+        }
+    }
+    supernodes.begin.push(n);
+    supernodes
 }
 
 impl FactorScratch {
@@ -198,14 +253,16 @@ mod tests {
             let symbolic = Symbolic::new(n, starts, rows).unwrap();
             let factor = symbolic.factorize(&values, &mut scratch).unwrap();
             let mut sparse = b.clone();
-            symbolic.solve(&factor, &mut sparse, columns, &mut scratch);
+            symbolic.solve(&factor, &mut sparse, &mut scratch);
+            let mut batch = b.clone();
+            symbolic.solve_batch(&factor, &mut batch, columns, &mut scratch);
             let mut dense = DenseFactor::default();
             let matrix = dense.matrix(n);
             for k in 0..n * n { matrix[k] = at(k % n, k / n); }
             dense.factorize().unwrap();
             let mut column = b[..n].to_vec();
             dense.solve(&mut column);
-            for k in 0..n * columns { prop_assert!((sparse[k] - x[k]).abs() < 1e-13); }
+            for k in 0..n * columns { prop_assert!((sparse[k] - x[k]).abs() < 1e-13 && (batch[k] - x[k]).abs() < 1e-13); }
             for k in 0..n { prop_assert!((column[k] - x[k]).abs() < 1e-13); }
         }
     }

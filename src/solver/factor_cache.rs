@@ -38,6 +38,8 @@ pub(crate) struct CacheWork {
 
 /// Steps after which an unused factor is dropped: two seconds at game speed.
 const UNUSED_STEPS: u64 = 120;
+/// Unused factors that are kept at all.
+const MAX_UNUSED: usize = 8;
 
 impl FactorCache {
     /// Starts a step: forgets factors that nobody used for a while, and, least recently used first,
@@ -46,6 +48,15 @@ impl FactorCache {
         self.step += 1;
         let oldest = self.step.saturating_sub(UNUSED_STEPS);
         self.factors.retain(|_, f| f.last_used >= oldest);
+        // A material or a step that changes all the time must not fill the memory with old factors.
+        let now = self.step;
+        let mut ages: Vec<u64> =
+            self.factors.values().map(|f| f.last_used).filter(|used| used + 1 < now).collect();
+        if ages.len() > MAX_UNUSED {
+            ages.sort_unstable();
+            let cutoff = ages[ages.len() - MAX_UNUSED];
+            self.factors.retain(|_, f| f.last_used >= cutoff);
+        }
         let models: std::collections::HashSet<u64> = self.factors.keys().map(|k| k.model).collect();
         self.symbolic.retain(|(model, _), _| models.contains(model));
         while self.column_bytes() > column_budget {
@@ -60,7 +71,7 @@ impl FactorCache {
     }
 
     /// Makes sure the factor of a body and the inverse's columns at these surface nodes are there.
-    /// `None` when the matrix is not positive definite, which finite materials do not make.
+    /// `None` when the matrix is not positive definite in double precision.
     pub fn prepare(
         &mut self,
         key: &FactorKey,

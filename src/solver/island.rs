@@ -40,14 +40,12 @@ enum Outcome {
     Descended,
     /// Descended, by a step that turned a body so far that contacts have to be solved again.
     Turned,
-    /// No scaling of the metric makes it descend: everything is as it was.
-    Stalled,
 }
 
 /// Largest factor on A that the guard tries.
 const MAX_SCALING: f64 = 1024.0;
 /// Residual relative to the forces that is rounding and nothing else: sums of some tens of terms.
-const ROUNDING: f64 = 1.0e-12;
+pub(crate) const ROUNDING: f64 = 1.0e-12;
 
 impl Island {
     /// Does the iterations of a step of `h` \[s\]; results are in the bodies' `current` and in the
@@ -75,12 +73,7 @@ impl Island {
             let outcome = self.iterate(&factors, partners, h, limits, last);
             let converged =
                 |b: &BodyProblem| b.residual() <= b.settings.tolerance.max(ROUNDING) * b.force_scale();
-            let done = match outcome {
-                Outcome::Stalled => true,
-                Outcome::Turned => false,
-                Outcome::Descended => self.bodies.iter().all(converged),
-            };
-            if done {
+            if outcome == Outcome::Descended && self.bodies.iter().all(converged) {
                 break;
             }
             if !self.contacts.is_empty() {
@@ -101,7 +94,6 @@ impl Island {
         limits: &ContactLimits,
         last: bool,
     ) -> Outcome {
-        self.contacts.keep();
         let mut outcome;
         loop {
             outcome = Outcome::Descended;
@@ -129,18 +121,18 @@ impl Island {
                 if body.trial_descends() {
                     continue;
                 }
-                descends = false;
-                body.guard_retries += 1;
-                // An update that does not descend is forgotten before the metric is doubted.
+                // An update that does not descend is forgotten before the metric is doubted. At the end
+                // of the scale the step is next to nothing, and taken: contacts were solved with it.
                 if !acceleration.is_empty() {
                     acceleration.clear();
                 } else if body.scaling < MAX_SCALING {
                     body.scaling *= 2.0;
                     rescaled = true;
                 } else {
-                    self.contacts.revert(&mut self.bodies);
-                    return Outcome::Stalled;
+                    continue;
                 }
+                descends = false;
+                body.guard_retries += 1;
             }
             if descends {
                 break;

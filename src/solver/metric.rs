@@ -166,7 +166,7 @@ impl Metric {
                         self.rhs[n * c + i] = r[i][c];
                     }
                 }
-                factor.symbolic.solve(&factor.factor, &mut self.rhs, 3, &mut self.scratch);
+                factor.symbolic.solve(&factor.factor, &mut self.rhs, &mut self.scratch);
                 for i in 0..n {
                     out[i] = Vec3::new(self.rhs[i], self.rhs[n + i], self.rhs[2 * n + i]);
                 }
@@ -176,7 +176,7 @@ impl Metric {
                     let turned = self.frame(i).tr_mul(&r[i]);
                     self.rhs[3 * i..3 * i + 3].copy_from_slice(turned.as_slice());
                 }
-                factor.symbolic.solve(&factor.factor, &mut self.rhs, 1, &mut self.scratch);
+                factor.symbolic.solve(&factor.factor, &mut self.rhs, &mut self.scratch);
                 for i in 0..n {
                     out[i] = self.frame(i) * Vec3::from_column_slice(&self.rhs[3 * i..3 * i + 3]);
                 }

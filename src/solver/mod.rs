@@ -16,10 +16,11 @@ mod partner;
 mod system;
 #[cfg(test)]
 mod tests;
+mod triangular;
 
 pub(crate) use body_problem::BodyProblem;
 pub(crate) use contact_system::ContactLimits;
 pub(crate) use factor_cache::FactorCache;
-pub(crate) use island::Island;
+pub(crate) use island::{Island, ROUNDING};
 pub(crate) use partner::{Partner, Reaction};
 pub(crate) use system::FactorKey;

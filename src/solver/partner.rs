@@ -77,14 +77,19 @@ impl Partner {
 
     /// Whether forces move it.
     pub fn yields(&self) -> bool {
-        matches!(self, Self::Rigid { .. })
+        match self {
+            Self::Prescribed { .. } => false,
+            Self::Rigid { inv_mass, inv_inertia, .. } => {
+                *inv_mass != Vec3::zeros() || *inv_inertia != Mat3::zeros()
+            }
+        }
     }
 
     /// Adds a force \[N\] that acts over a step at the point `p`.
     pub fn add_reaction(&self, reaction: &mut Reaction, p: &Vec3, force: &Vec3, h: f64) {
-        reaction.touched = true;
-        reaction.impulse += force * h;
         if let Self::Rigid { com, .. } = self {
+            reaction.touched = true;
+            reaction.impulse += force * h;
             reaction.torque_impulse += (p - com).cross(force) * h;
         }
     }

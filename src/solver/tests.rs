@@ -60,7 +60,7 @@ fn dense(body: &DeformableBody, system: SystemMatrix) -> DMatrix<f64> {
 
 #[test]
 fn contact_set_elimination_is_the_surface_block_solve() {
-    // physics: DiffPD's x_C̄ = (A_C̄C̄)⁻¹(b − A x*)_C̄, r = (A x − b)_C, against y = A⁻¹b,
+    // DiffPD [Du et al. 2021]: x_C̄ = (A_C̄C̄)⁻¹(b − A x*)_C̄, r = (A x − b)_C, against y = A⁻¹b,
     // λ = (A⁻¹_CC)⁻¹(x* − y)_C, x = y + A⁻¹I_C λ with A⁻¹_CC from the stored columns.
     let body = body(SystemMatrix::RestStiffness, Frames::Floating, false);
     let A = dense(&body, SystemMatrix::RestStiffness);
@@ -90,7 +90,7 @@ fn contact_set_elimination_is_the_surface_block_solve() {
     let mut scratch = super::factor::FactorScratch::default();
     let mut solve = |v: &DVector<f64>| {
         let mut v = v.clone();
-        factor.symbolic.solve(&factor.factor, v.as_mut_slice(), 1, &mut scratch);
+        factor.symbolic.solve(&factor.factor, v.as_mut_slice(), &mut scratch);
         v
     };
     let y = solve(&b);
