@@ -322,6 +322,11 @@ impl BodyProblem {
         self.trial.objective - by_contact <= self.current.objective - promised + rounding
     }
 
+    /// Makes the trial the current iterate: no step.
+    pub fn reject_trial(&mut self) {
+        self.trial.clone_from(&self.current);
+    }
+
     pub fn accept_trial(&mut self) {
         std::mem::swap(&mut self.current, &mut self.trial);
     }

@@ -40,6 +40,8 @@ enum Outcome {
     Descended,
     /// Descended, by a step that turned a body so far that contacts have to be solved again.
     Turned,
+    /// No body found a step to take.
+    Stalled,
 }
 
 /// Largest factor on A that the guard tries.
@@ -73,7 +75,12 @@ impl Island {
             let outcome = self.iterate(&factors, partners, h, limits, last);
             let converged =
                 |b: &BodyProblem| b.residual() <= b.settings.tolerance.max(ROUNDING) * b.force_scale();
-            if outcome == Outcome::Descended && self.bodies.iter().all(converged) {
+            let done = match outcome {
+                Outcome::Stalled => true,
+                Outcome::Turned => false,
+                Outcome::Descended => self.bodies.iter().all(converged),
+            };
+            if done {
                 break;
             }
             if !self.contacts.is_empty() {
@@ -116,23 +123,29 @@ impl Island {
             }
             let mut descends = true;
             let mut rescaled = false;
+            let mut stalled = 0;
             for (body, acceleration) in self.bodies.iter_mut().zip(&mut self.accelerations) {
                 body.evaluate_trial();
                 if body.trial_descends() {
                     continue;
                 }
                 // An update that does not descend is forgotten before the metric is doubted. At the end
-                // of the scale the step is next to nothing, and taken: contacts were solved with it.
+                // of the scale the body stays where it is: its step would have been a thousandth.
                 if !acceleration.is_empty() {
                     acceleration.clear();
                 } else if body.scaling < MAX_SCALING {
                     body.scaling *= 2.0;
                     rescaled = true;
                 } else {
+                    body.reject_trial();
+                    stalled += 1;
                     continue;
                 }
                 descends = false;
                 body.guard_retries += 1;
+            }
+            if stalled == self.bodies.len() {
+                outcome = Outcome::Stalled;
             }
             if descends {
                 break;
