@@ -25,7 +25,7 @@ const SHIFT: f64 = 0.1;
 /// Part of the body's size within which a projection's direction is not trusted.
 const BAND: f64 = 1.0e-4;
 /// Slot of the first closest point on a feature; those before are nodes, rims and corners.
-const FIRST_POINT: u32 = 2;
+const FIRST_POINT: u32 = 1;
 
 /// Finds contacts; holds the memory it needs between calls.
 #[derive(Default)]
@@ -144,6 +144,7 @@ impl Detector {
         for (e, edge) in surface.edges.iter().enumerate() {
             let ends = edge.map(|n| surface.index_of_node[n as usize] as usize);
             let reach = self.reach[ends[0]].max(self.reach[ends[1]]) + scene.motion;
+            let mut best = None;
             for [inner, outer] in [[0, 1], [1, 0]] {
                 let (Some(on_face), other) = (self.nodes[ends[inner]], self.nodes[ends[outer]]) else {
                     continue;
@@ -155,14 +156,19 @@ impl Detector {
                 let [a, b] = [self.local[ends[inner]], self.local[ends[outer]]];
                 let outward = self.edge_normal(surface, e);
                 let crossing = rim_crossing(scene.obstacle, &on_face, &a, &b, &outward, &scene.scales);
-                if let Some((t, found)) = crossing.filter(|(_, f)| f.gap < reach) {
-                    self.edges[e] = Some(found);
+                let deeper =
+                    |f: &SurfacePoint| best.as_ref().is_none_or(|(_, b): &(Row, SurfacePoint)| f.gap < b.gap);
+                if let Some((t, found)) = crossing.filter(|(_, f)| f.gap < reach && deeper(f)) {
                     let nodes = [edge[inner], edge[outer], 0];
-                    let mut row = scene.row(nodes, [1.0 - t, t, 0.0], &found, scene.edge_feature(e));
-                    // Draped over an edge of the obstacle, one edge of the body crosses two rims.
-                    row.key.slot = inner as u32;
-                    rows.push(row);
+                    let row = scene.row(nodes, [1.0 - t, t, 0.0], &found, scene.edge_feature(e));
+                    best = Some((row, found));
                 }
+            }
+            // Draped over an edge of the obstacle, one edge of the body crosses two rims in one place:
+            // the deeper one stands for both.
+            if let Some((row, found)) = best {
+                self.edges[e] = Some(found);
+                rows.push(row);
             }
         }
     }
@@ -198,10 +204,14 @@ impl Detector {
 
     /// Closest points that carried in the last step are looked at again where they were. One closest
     /// point per triangle is not enough where a surface wraps around another: pushed in at one
-    /// point, the next one is elsewhere, and without memory the two would take turns for ever.
+    /// point, the next one is elsewhere, and without memory the two would take turns for ever. Shapes of
+    /// plane faces are left out: beside an edge the normal of a face is not the one of the contact.
     fn keep_points(&mut self, scene: &Scene<'_>, memory: &[ContactMemory], rows: &mut Vec<Row>) {
         let surface = &scene.model.surface;
         self.points.clear();
+        if scene.obstacle.is_faceted() {
+            return;
+        }
         for kept in memory.iter().filter(|m| m.key.slot >= FIRST_POINT) {
             let s = kept.nodes.map(|n| surface.index_of_node[n as usize] as usize);
             // A restored state may be another mesh's.

@@ -61,6 +61,12 @@ impl Obstacle {
         }
     }
 
+    /// Made of plane faces: nodes, rims and corners carry what lies on it.
+    pub fn is_faceted(&self) -> bool {
+        use TypedShape::{ConvexPolyhedron, Cuboid, TriMesh, Voxels};
+        matches!(self.shape.as_typed_shape(), Cuboid(_) | ConvexPolyhedron(_) | TriMesh(_) | Voxels(_))
+    }
+
     /// A plane without edges: its contacts with a body are all at nodes.
     pub fn is_half_space(&self) -> bool {
         self.shape.as_halfspace().is_some()
