@@ -116,6 +116,19 @@ impl Detector {
             self.keep_points(&scene, memory, rows);
             self.detect_triangles(&scene, rows);
         }
+        if obstacle.is_faceted() {
+            // One row per feature: the deepest.
+            rows[first..].iter_mut().for_each(|r| r.key.slot = 0);
+            rows[first..].sort_by(|a, b| a.key.cmp(&b.key).then(a.gap.total_cmp(&b.gap)));
+            let mut kept = first;
+            for i in first..rows.len() {
+                if kept == first || rows[kept - 1].key != rows[i].key {
+                    rows.swap(kept, i);
+                    kept += 1;
+                }
+            }
+            rows.truncate(kept);
+        }
         rows[first..].sort_by_key(|r| r.key);
     }
 
