@@ -117,17 +117,7 @@ impl Detector {
             self.detect_triangles(&scene, rows);
         }
         if obstacle.is_faceted() {
-            // One row per feature: the deepest.
-            rows[first..].iter_mut().for_each(|r| r.key.slot = 0);
-            rows[first..].sort_by(|a, b| a.key.cmp(&b.key).then(a.gap.total_cmp(&b.gap)));
-            let mut kept = first;
-            for i in first..rows.len() {
-                if kept == first || rows[kept - 1].key != rows[i].key {
-                    rows.swap(kept, i);
-                    kept += 1;
-                }
-            }
-            rows.truncate(kept);
+            one_row_per_feature(rows, first);
         }
         rows[first..].sort_by_key(|r| r.key);
     }
@@ -217,14 +207,12 @@ impl Detector {
 
     /// Closest points that carried in the last step are looked at again where they were. One closest
     /// point per triangle is not enough where a surface wraps around another: pushed in at one
-    /// point, the next one is elsewhere, and without memory the two would take turns for ever. Shapes of
-    /// plane faces are left out: beside an edge the normal of a face is not the one of the contact.
+    /// point, the next one is elsewhere, and without memory the two would take turns for ever. Rows with
+    /// shapes of plane faces have no slots, and so none is kept: beside an edge the normal of a face is not
+    /// the one of the contact.
     fn keep_points(&mut self, scene: &Scene<'_>, memory: &[ContactMemory], rows: &mut Vec<Row>) {
         let surface = &scene.model.surface;
         self.points.clear();
-        if scene.obstacle.is_faceted() {
-            return;
-        }
         for kept in memory.iter().filter(|m| m.key.slot >= FIRST_POINT) {
             let s = kept.nodes.map(|n| surface.index_of_node[n as usize] as usize);
             // A restored state may be another mesh's.
@@ -329,4 +317,18 @@ impl Scene<'_> {
 fn near(extent: &Aabb, p: &Vec3, reach: f64) -> bool {
     let (low, high) = (from_real(extent.mins), from_real(extent.maxs));
     (0..3).all(|k| p[k] >= low[k] - reach && p[k] <= high[k] + reach)
+}
+
+/// Of the rows from `first` on that name one feature, the deepest stays.
+fn one_row_per_feature(rows: &mut Vec<Row>, first: usize) {
+    rows[first..].iter_mut().for_each(|r| r.key.slot = 0);
+    rows[first..].sort_by(|a, b| a.key.cmp(&b.key).then(a.gap.total_cmp(&b.gap)));
+    let mut kept = first;
+    for i in first..rows.len() {
+        if kept == first || rows[kept - 1].key != rows[i].key {
+            rows.swap(kept, i);
+            kept += 1;
+        }
+    }
+    rows.truncate(kept);
 }

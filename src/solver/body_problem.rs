@@ -60,8 +60,6 @@ pub(crate) struct Iterate {
     pub r: Vec<Vec3>,
     /// Ψ \[J\].
     pub objective: f64,
-    /// Sum of the sizes of Ψ's terms \[J\], for its rounding.
-    pub magnitude: f64,
     /// Least `tr(QᵀR)` of the elements against the body's frame.
     pub least_trace: f64,
     /// Largest internal force on a node \[N\].
@@ -304,7 +302,6 @@ impl BodyProblem {
             kinetic += m * (inertia * from_target.norm_squared() + drag * moved.norm_squared());
         }
         at.objective = elastic.energy + 0.5 * kinetic;
-        at.magnitude = at.objective;
     }
 
     /// The guard [cf. Nocedal & Wright 2006, sufficient decrease]:
@@ -318,7 +315,7 @@ impl BodyProblem {
         }
         let promised = 0.1 * (by_contact + by_residual);
         // Ψ is a sum over the elements: its rounding is below 1e-13 of its terms.
-        let rounding = 1e-12 * (self.trial.magnitude + self.current.magnitude + by_contact.abs());
+        let rounding = 1e-12 * (self.trial.objective + self.current.objective + by_contact.abs());
         self.trial.objective - by_contact <= self.current.objective - promised + rounding
     }
 
