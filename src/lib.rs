@@ -46,7 +46,7 @@ mod pipeline;
 
 pub use body::{
     Acceleration, BodyError, DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet,
-    DeformableModel, DeformableState, Frames, Pin, SolverSettings, SystemMatrix,
+    DeformableModel, DeformableState, FactorPrecision, Frames, Pin, SolverSettings, SystemMatrix,
 };
 pub use energy::Elasticity;
 pub use error::{DeformableBodyError, HandleError};
@@ -61,8 +61,8 @@ pub mod prelude {
     pub use crate::{
         Acceleration, DeformableBody, DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle,
         DeformableBodySet, DeformableContact, DeformableCounters, DeformableMaterial, DeformableModel,
-        DeformableParameters, DeformablePipeline, DeformableWorld, Elasticity, Frames, SolverSettings,
-        SystemMatrix, TetMesh,
+        DeformableParameters, DeformablePipeline, DeformableWorld, Elasticity, FactorPrecision, Frames,
+        SolverSettings, SystemMatrix, TetMesh,
     };
 }
 

@@ -17,6 +17,6 @@ pub use body::{BodyError, DeformableBody, Pin};
 pub use builder::DeformableBodyBuilder;
 pub use model::DeformableModel;
 pub use set::{DeformableBodyHandle, DeformableBodySet};
-pub use settings::{Acceleration, Frames, SolverSettings, SystemMatrix};
+pub use settings::{Acceleration, FactorPrecision, Frames, SolverSettings, SystemMatrix};
 pub use state::DeformableState;
 pub(crate) use state::{ContactKey, ContactMemory, is_number};

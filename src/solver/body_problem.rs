@@ -19,6 +19,9 @@ const FLOATING_LIMIT: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Error of the body's frame \[rad\] beyond which it is refreshed within a step.
 const FRAME_ERROR: f64 = 1.0e-4;
 
+/// Largest turn \[rad\] that [`BodyProblem::balance`] takes for the rest of an iteration.
+const MAX_BALANCING_TURN: f64 = 0.1;
+
 /// A body's step in the making.
 pub(crate) struct BodyProblem {
     pub key: FactorKey,
@@ -239,6 +242,30 @@ impl BodyProblem {
             *y += bend * (x - centre);
         }
         true
+    }
+
+    /// Moves and turns a body that nothing holds as a whole, so that its residual has neither force nor
+    /// moment: what is left of it after a few iterations would set the body spinning. Deforms nothing.
+    pub fn balance(&mut self) {
+        let mobility = self.h * self.h / (1.0 + self.material.mass_damping * self.h);
+        let total: f64 = self.masses.iter().sum();
+        let x = &mut self.current.x;
+        let centre = x.iter().zip(&self.masses).map(|(x, m)| x * *m).sum::<Vec3>() / total;
+        let (mut force, mut moment, mut inertia) = (Vec3::zeros(), Vec3::zeros(), Mat3::zeros());
+        for ((x, r), m) in x.iter().zip(&self.current.r).zip(&self.masses) {
+            let arm = x - centre;
+            force += r;
+            moment += arm.cross(r);
+            inertia += (Mat3::identity() * arm.norm_squared() - arm * arm.transpose()) * *m;
+        }
+        let Some(turn) = inertia.try_inverse().map(|inverse| inverse * moment * mobility) else {
+            return;
+        };
+        if !(turn.norm() < MAX_BALANCING_TURN) {
+            return;
+        }
+        let (rotation, shift) = (rotation_from_vector(&turn), force * (mobility / total));
+        x.iter_mut().for_each(|x| *x = centre + shift + rotation * (*x - centre));
     }
 
     /// Pinned nodes are rows of the identity in A, without neighbours: what the solve says of them

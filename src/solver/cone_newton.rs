@@ -5,7 +5,7 @@
 //! With the projection γ(z) of −ĝ/R onto the cones, a globalised Newton method minimises the convex
 //! `f(z) = ½zᵀWz + ½γᵀRγ`, `∇f = W(z − γ)`, in the family of SAP [Castro et al. 2022].
 
-use super::factor::DenseFactor;
+use super::cone_hessian::{ConeHessian, dot, spatial};
 use crate::contact::cone;
 use crate::math::dense;
 
@@ -17,6 +17,8 @@ pub(crate) struct ConeProblem {
     pub friction: Vec<f64>,
     /// Delassus operator [m/N], dense, symmetric.
     pub W: Vec<f64>,
+    /// Changes whenever W does.
+    pub version: u64,
     /// Gaps and slips without contact forces \[m\], the shift included in the normal ones.
     pub g: Vec<f64>,
 }
@@ -40,6 +42,8 @@ pub(crate) struct ConeWork {
 
 /// Proximal parameter of the result.
 const EPSILON: f64 = 1.0e-4;
+/// Error from which on Newton's method converges fast.
+const NEARLY: f64 = 1.0e-2;
 /// Newton steps that a warm start may take before the ladder is climbed.
 const WARM_STEPS: usize = 4;
 /// Forces are left as they are at the start if they are no worse than the tolerance times this. A
@@ -56,18 +60,14 @@ pub(crate) struct ConeSolver {
     z: Vec<f64>,
     gamma: Vec<f64>,
     u: Vec<f64>,
+    /// Points whose places on the cones are where the contacts are expected to end.
+    expected: Vec<f64>,
     dz: Vec<f64>,
     Wz: Vec<f64>,
     Wdz: Vec<f64>,
     center: Vec<f64>,
     R: Vec<f64>,
-    columns: Vec<[[f64; 3]; 3]>,
-    column_offsets: Vec<usize>,
-    reduced: Vec<f64>,
-    hessian: DenseFactor,
-    /// The matrix that `hessian` was made of: equal bits, equal factor.
-    factored: Vec<f64>,
-    fresh: Vec<f64>,
+    hessian: ConeHessian,
 }
 
 impl ConeProblem {
@@ -91,6 +91,22 @@ impl ConeProblem {
 }
 
 impl ConeSolver {
+    /// Tells where the contacts are expected to end: as they were left, with slips of σ/μ.
+    pub fn expect(&mut self, problem: &ConeProblem, lambda: &[f64], shift: &[f64]) {
+        self.set_regularisation(problem, EPSILON);
+        self.expected.clear();
+        self.expected.extend_from_slice(lambda);
+        for (i, &mu) in problem.friction.iter().enumerate() {
+            let force = &mut self.expected[problem.offsets[i]..problem.offsets[i + 1]];
+            let [normal, a, b] = force else { continue };
+            let friction = a.hypot(*b);
+            if *normal > 0.0 && shift[i] > 0.0 && friction > 0.0 {
+                let beyond = 1.0 + shift[i] / (mu * self.R[i] * friction);
+                (*a, *b) = (*a * beyond, *b * beyond);
+            }
+        }
+    }
+
     /// Improves `lambda` \[N\], which holds the proximal centre and the start, to the solution.
     /// `W_lambda` holds the product of the two and is kept so.
     pub fn solve(
@@ -117,6 +133,7 @@ impl ConeSolver {
             rungs.iter().all(|&(epsilon, steps)| {
                 let done = solver.minimise(problem, epsilon, steps, tolerance, &mut work);
                 solver.center.clone_from(&solver.gamma);
+                solver.expected.clone_from(&solver.u);
                 done
             })
         };
@@ -167,16 +184,21 @@ impl ConeSolver {
         self.set_regularisation(problem, epsilon);
         let mut z = std::mem::take(&mut self.z);
         self.project(problem);
+        self.jump(problem, &mut z, tolerance, work);
         let mut done = false;
-        for step in 0..=steps {
-            let error = largest(z.iter().zip(&self.gamma).map(|(z, g)| z - g));
-            let scale = largest(self.gamma.iter().copied()).max(tolerance.floor);
-            done = error.is_finite() && error <= tolerance.relative * scale;
-            if done || step == steps || !error.is_finite() {
+        for step in 0..=RUNG_STEPS {
+            let error = self.error(&z, tolerance);
+            done = error <= tolerance.relative;
+            if done || step >= steps && error > NEARLY || !error.is_finite() {
                 break;
             }
             work.newton_steps += 1;
-            if !self.newton_direction(problem, &z, work) {
+            self.dz.clear();
+            self.dz.extend(self.gamma.iter().zip(&z).map(|(g, z)| g - z));
+            let u = std::mem::take(&mut self.u);
+            let found = self.newton_direction(problem, &u, work);
+            self.u = u;
+            if !found {
                 break;
             }
             let dz = std::mem::take(&mut self.dz);
@@ -192,6 +214,61 @@ impl ConeSolver {
         }
         self.z = z;
         done
+    }
+
+    /// `‖z − γ‖∞` relative to the largest force; infinite if it is not a number.
+    fn error(&self, z: &[f64], tolerance: ConeTolerance) -> f64 {
+        let scale = largest(self.gamma.iter().copied()).max(tolerance.floor);
+        largest(z.iter().zip(&self.gamma).map(|(z, g)| z - g)) / scale
+    }
+
+    /// Goes to where z would be if every contact were where it is expected on its cone, if that is
+    /// better: the projection onto a cone is its own derivative times the point, so with G the
+    /// derivative at the expected point, z = G u(z) is linear.
+    fn jump(&mut self, problem: &ConeProblem, z: &mut [f64], tolerance: ConeTolerance, work: &mut ConeWork) {
+        if self.expected.len() != z.len() {
+            return;
+        }
+        let before = self.error(z, tolerance);
+        if before <= tolerance.relative {
+            return;
+        }
+        work.newton_steps += 1;
+        let expected = std::mem::take(&mut self.expected);
+        self.dz.clear();
+        for i in 0..problem.contacts() {
+            let rows = problem.offsets[i]..problem.offsets[i + 1];
+            let u = spatial(&self.u[rows.clone()]);
+            let mut columns = [[0.0; 3]; 3];
+            let count = cone::curvature_columns(
+                spatial(&expected[rows.clone()]),
+                problem.friction[i],
+                self.R[i],
+                &mut columns,
+            );
+            let mut force = [0.0; 3];
+            for column in &columns[..count] {
+                let along = self.R[i] * dot(column, &u);
+                (0..3).for_each(|k| force[k] += column[k] * along);
+            }
+            self.dz.extend(rows.zip(force).map(|(k, f)| f - z[k]));
+        }
+        if self.newton_direction(problem, &expected, work) {
+            let dz = std::mem::take(&mut self.dz);
+            let mut Wdz = std::mem::take(&mut self.Wdz);
+            problem.multiply(&dz, &mut Wdz);
+            z.iter_mut().zip(&dz).for_each(|(z, d)| *z += d);
+            self.Wz.iter_mut().zip(&Wdz).for_each(|(z, d)| *z += d);
+            self.project(problem);
+            let after = self.error(z, tolerance);
+            if !(after < before) {
+                z.iter_mut().zip(&dz).for_each(|(z, d)| *z -= d);
+                self.Wz.iter_mut().zip(&Wdz).for_each(|(z, d)| *z -= d);
+                self.project(problem);
+            }
+            (self.dz, self.Wdz) = (dz, Wdz);
+        }
+        self.expected = expected;
     }
 
     fn set_regularisation(&mut self, problem: &ConeProblem, epsilon: f64) {
@@ -219,92 +296,19 @@ impl ConeSolver {
         }
     }
 
-    /// `dz = b − L(I + LᵀWL)⁻¹LᵀWb`, b = γ − z.
-    fn newton_direction(&mut self, problem: &ConeProblem, z: &[f64], work: &mut ConeWork) -> bool {
-        self.dz.clear();
-        self.dz.extend(self.gamma.iter().zip(z).map(|(g, z)| g - z));
-        self.columns.resize(problem.contacts(), [[0.0; 3]; 3]);
-        self.column_offsets.clear();
-        self.column_offsets.push(0);
-        let mut size = 0;
-        for i in 0..problem.contacts() {
-            let u = spatial(&self.u[problem.offsets[i]..problem.offsets[i + 1]]);
-            size += cone::curvature_columns(u, problem.friction[i], self.R[i], &mut self.columns[i]);
-            self.column_offsets.push(size);
-        }
-        if size == 0 {
+    /// Turns b in `dz` to `(1 + L Lᵀ W)⁻¹ b`, with the curvature L Lᵀ at u.
+    fn newton_direction(&mut self, problem: &ConeProblem, u: &[f64], work: &mut ConeWork) -> bool {
+        self.hessian.set_curvature(problem, u, &self.R);
+        if self.hessian.order() == 0 {
             return true;
         }
-        if !self.factor_hessian(problem, size, work) {
+        let Some(had_to) = self.hessian.factorize(problem) else {
             return false;
-        }
-        let mut Wb = std::mem::take(&mut self.Wdz);
-        problem.multiply(&self.dz, &mut Wb);
-        let mut reduced = std::mem::take(&mut self.reduced);
-        reduced.clear();
-        for i in 0..problem.contacts() {
-            let b = spatial(&Wb[problem.offsets[i]..problem.offsets[i + 1]]);
-            reduced.extend(self.columns_of(i).iter().map(|c| dot(c, &b)));
-        }
-        self.hessian.solve(&mut reduced);
-        let mut dz = std::mem::take(&mut self.dz);
-        for i in 0..problem.contacts() {
-            for (c, k) in self.columns_of(i).iter().zip(self.column_offsets[i]..) {
-                for (row, r) in (problem.offsets[i]..problem.offsets[i + 1]).enumerate() {
-                    dz[r] -= c[row] * reduced[k];
-                }
-            }
-        }
-        (self.Wdz, self.dz, self.reduced) = (Wb, dz, reduced);
+        };
+        work.factorizations += usize::from(had_to);
+        problem.multiply(&self.dz, &mut self.Wdz);
+        self.hessian.solve(problem, &mut self.dz, &self.Wdz);
         true
-    }
-
-    fn columns_of(&self, contact: usize) -> &[[f64; 3]] {
-        let count = self.column_offsets[contact + 1] - self.column_offsets[contact];
-        &self.columns[contact][..count]
-    }
-
-    /// Factors `I + LᵀWL`, unless it is the matrix that was factored last.
-    fn factor_hessian(&mut self, problem: &ConeProblem, size: usize, work: &mut ConeWork) -> bool {
-        let mut matrix = std::mem::take(&mut self.fresh);
-        matrix.clear();
-        matrix.resize(size * size, 0.0);
-        for j in 0..problem.contacts() {
-            for (c, column) in self.columns_of(j).iter().enumerate() {
-                let at = self.column_offsets[j] + c;
-                for i in j..problem.contacts() {
-                    let columns = self.columns_of(i);
-                    if columns.is_empty() {
-                        continue;
-                    }
-                    let rows = problem.offsets[i]..problem.offsets[i + 1];
-                    let mut Wc = [0.0; 3];
-                    for (k, r) in rows.enumerate() {
-                        let mut sum = 0.0;
-                        for (x, s) in column.iter().zip(problem.offsets[j]..problem.offsets[j + 1]) {
-                            sum += x * problem.W[s * problem.rows() + r];
-                        }
-                        Wc[k] = sum;
-                    }
-                    for (d, other) in columns.iter().enumerate() {
-                        matrix[at * size + self.column_offsets[i] + d] = dot(other, &Wc);
-                    }
-                }
-                matrix[at * size + at] += 1.0;
-            }
-        }
-        if self.hessian.order() == size && self.factored == matrix {
-            self.fresh = matrix;
-            return true;
-        }
-        self.hessian.matrix(size).copy_from_slice(&matrix);
-        work.factorizations += 1;
-        let done = self.hessian.factorize().is_ok();
-        self.fresh = std::mem::replace(&mut self.factored, matrix);
-        if !done {
-            self.factored.clear();
-        }
-        done
     }
 
     /// Root of the monotone `f′(t) = (W dz)·(z + t dz − γ(z + t dz))`, to a tenth of f′(0).
@@ -354,18 +358,6 @@ impl ConeSolver {
         }
         low.max(1e-6)
     }
-}
-
-fn spatial(rows: &[f64]) -> [f64; 3] {
-    match rows {
-        [n, t1, t2] => [*n, *t1, *t2],
-        [n, ..] => [*n, 0.0, 0.0],
-        [] => [0.0; 3],
-    }
-}
-
-fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Largest absolute value; infinite if one is NaN.

@@ -158,7 +158,13 @@ impl ContactSystem {
             }
         }
         self.problem.W = W;
+        self.problem.version += 1;
         self.problem.multiply(&self.lambda, &mut self.slips);
+    }
+
+    /// Lets the solve begin where the last step's forces and slips were.
+    pub fn expect(&mut self) {
+        self.solver.expect(&self.problem, &self.lambda, &self.shift);
     }
 
     /// Takes the gaps at the bodies' trial positions, to which the present forces have brought them,

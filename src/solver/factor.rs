@@ -3,16 +3,19 @@
 //! All solves are sequential (`Par::Seq`): faer's threads cost more than small supernodes are
 //! worth, and parallelism is over bodies. Everything works in memory the caller owns.
 
-use super::triangular::Supernodes;
+use super::triangular::{Entry, Supernodes};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::reborrow::ReborrowMut;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
-use faer::{Conj, MatMut, MatRef, Par, Side, Spec};
+use faer::{Accum, MatMut, MatRef, Par, Side, Spec};
 
 /// Right-hand sides of one batch of columns: always the same number, so that a column has the same
 /// bits whichever batch it comes from.
@@ -28,10 +31,30 @@ pub(crate) struct Symbolic {
     order: Vec<usize>,
 }
 
-/// A numeric factor `A = L Lᵀ`.
+/// A numeric factor `A = L Lᵀ`. Solves are in double precision with either.
 #[derive(Debug)]
-pub(crate) struct Factor {
-    values: Vec<f64>,
+pub(crate) enum Factor {
+    Double(Vec<f64>),
+    /// Computed in double precision, then rounded: what it solves is a matrix that differs from A by
+    /// 6e-8 of its norm, with half the bytes to read.
+    Single(Vec<f32>),
+}
+
+impl Factor {
+    /// The same in single precision.
+    pub fn rounded(self) -> Self {
+        match self {
+            Self::Double(values) => Self::Single(values.iter().map(|&l| l as f32).collect()),
+            single => single,
+        }
+    }
+
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Double(values) => size_of_val(values.as_slice()),
+            Self::Single(values) => size_of_val(values.as_slice()),
+        }
+    }
 }
 
 /// Memory for solves and factorizations; grows to what is needed and stays.
@@ -41,6 +64,7 @@ pub(crate) struct FactorScratch {
     bytes: usize,
     ordered: Vec<f64>,
     gathered: Vec<f64>,
+    panel: Vec<f64>,
 }
 
 /// The matrix is not positive definite, or not finite.
@@ -76,9 +100,9 @@ impl Symbolic {
         self.pattern.row_idx()
     }
 
-    /// Bytes of the numeric factor.
-    pub fn factor_bytes(&self) -> usize {
-        self.cholesky.len_val() * size_of::<f64>()
+    /// Numbers in a numeric factor.
+    pub fn factor_len(&self) -> usize {
+        self.cholesky.len_val()
     }
 
     /// Factors the matrix with these `values`, in the order of [`Symbolic::rows`].
@@ -101,7 +125,7 @@ impl Symbolic {
                 Spec::default(),
             )
             .map_err(|_| NotPositiveDefinite)?;
-        Ok(Factor { values: factor })
+        Ok(Factor::Double(factor))
     }
 
     /// Solves `A X = B` in place; `rhs` holds the columns of B one after the other.
@@ -110,23 +134,79 @@ impl Symbolic {
         for column in rhs.chunks_exact_mut(self.order.len()) {
             ordered.clear();
             ordered.extend(self.order.iter().map(|&old| column[old]));
-            self.supernodes.solve(&factor.values, ordered, gathered);
+            match factor {
+                Factor::Double(values) => self.supernodes.solve(values, ordered, gathered),
+                Factor::Single(values) => self.supernodes.solve(values, ordered, gathered),
+            }
             for (&old, x) in self.order.iter().zip(ordered.iter()) {
                 column[old] = *x;
             }
         }
     }
 
-    /// As [`Symbolic::solve`], for many columns at once.
+    /// As [`Symbolic::solve`], for many columns at once, of which most numbers may be zero.
     pub fn solve_batch(&self, factor: &Factor, rhs: &mut [f64], columns: usize, scratch: &mut FactorScratch) {
-        let n = self.cholesky.nrows();
-        let need = self.cholesky.solve_in_place_scratch::<f64>(columns, Par::Seq);
-        LltRef::new(&self.cholesky, &factor.values).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(rhs, n, columns),
-            Par::Seq,
-            scratch.stack(need.unaligned_bytes_required()),
-        );
+        let n = self.order.len();
+        let mut ordered = std::mem::take(&mut scratch.ordered);
+        ordered.clear();
+        for column in rhs.chunks_exact(n) {
+            ordered.extend(self.order.iter().map(|&old| column[old]));
+        }
+        match factor {
+            Factor::Double(values) => self.solve_panels(values, &mut ordered, columns, scratch),
+            Factor::Single(values) => self.solve_panels(values, &mut ordered, columns, scratch),
+        }
+        for (column, x) in rhs.chunks_exact_mut(n).zip(ordered.chunks_exact(n)) {
+            for (&old, x) in self.order.iter().zip(x) {
+                column[old] = *x;
+            }
+        }
+        scratch.ordered = ordered;
+    }
+
+    fn solve_panels<T: Entry>(
+        &self,
+        values: &[T],
+        x: &mut [f64],
+        columns: usize,
+        scratch: &mut FactorScratch,
+    ) {
+        let n = self.order.len();
+        let count = self.supernodes.begin.len() - 1;
+        let FactorScratch { gathered, panel, .. } = scratch;
+        let places = (0..count).map(|s| (s, true)).chain((0..count).rev().map(|s| (s, false)));
+        for (s, forward) in places {
+            let (own, rows, L) = self.supernodes.parts(s, values);
+            // Where a right-hand side is still zero, so is the solution.
+            if forward && (0..columns).all(|c| x[c * n..][own.clone()].iter().all(|v| *v == 0.0)) {
+                continue;
+            }
+            panel.clear();
+            panel.extend(L.iter().map(|&l| l.into()));
+            let L = MatRef::from_column_major_slice(panel, own.len() + rows.len(), own.len());
+            let (triangle, below) = L.split_at_row(own.len());
+            gathered.clear();
+            if forward {
+                gathered.resize(rows.len() * columns, 0.0);
+                let mut X = MatMut::from_column_major_slice_mut(x, n, columns);
+                let mut top = X.rb_mut().subrows_mut(own.start, own.len());
+                solve_lower_triangular_in_place(triangle, top.rb_mut(), Par::Seq);
+                let product = MatMut::from_column_major_slice_mut(gathered, rows.len(), columns);
+                matmul(product, Accum::Replace, below, top, 1.0, Par::Seq);
+                for (g, x) in gathered.chunks_exact(rows.len().max(1)).zip(x.chunks_exact_mut(n)) {
+                    rows.iter().zip(g).for_each(|(&row, g)| x[row] -= g);
+                }
+            } else {
+                for x in x.chunks_exact(n) {
+                    gathered.extend(rows.iter().map(|&row| x[row]));
+                }
+                let mut X = MatMut::from_column_major_slice_mut(x, n, columns);
+                let mut top = X.rb_mut().subrows_mut(own.start, own.len());
+                let known = MatRef::from_column_major_slice(gathered, rows.len(), columns);
+                matmul(top.rb_mut(), Accum::Add, below.transpose(), known, -1.0, Par::Seq);
+                solve_upper_triangular_in_place(triangle.transpose(), top, Par::Seq);
+            }
+        }
     }
 }
 
@@ -179,20 +259,21 @@ pub(crate) struct DenseFactor {
 }
 
 impl DenseFactor {
-    /// Order of the factored matrix.
-    pub fn order(&self) -> usize {
-        self.n
+    /// The memory for a matrix of order n, column by column, to be filled and put back; only its lower
+    /// triangle is read.
+    pub fn take_matrix(&mut self, n: usize) -> Vec<f64> {
+        let mut values = std::mem::take(&mut self.values);
+        values.resize(n * n, 0.0);
+        values
     }
 
-    /// The memory for a matrix of order n, column by column; only its lower triangle is read.
-    pub fn matrix(&mut self, n: usize) -> &mut [f64] {
-        self.n = n;
-        self.values.clear();
-        self.values.resize(n * n, 0.0);
-        &mut self.values
+    /// Puts a matrix of order n in place.
+    pub fn put_matrix(&mut self, values: Vec<f64>, n: usize) {
+        assert_eq!(values.len(), n * n);
+        (self.values, self.n) = (values, n);
     }
 
-    /// Factors what was written to [`DenseFactor::matrix`].
+    /// Factors the matrix in its place.
     pub fn factorize(&mut self) -> Result<(), NotPositiveDefinite> {
         let n = self.n;
         let need = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Spec::default());
@@ -257,8 +338,7 @@ mod tests {
             let mut batch = b.clone();
             symbolic.solve_batch(&factor, &mut batch, columns, &mut scratch);
             let mut dense = DenseFactor::default();
-            let matrix = dense.matrix(n);
-            for k in 0..n * n { matrix[k] = at(k % n, k / n); }
+            dense.put_matrix((0..n * n).map(|k| at(k % n, k / n)).collect(), n);
             dense.factorize().unwrap();
             let mut column = b[..n].to_vec();
             dense.solve(&mut column);
@@ -271,7 +351,7 @@ mod tests {
     fn indefinite_and_non_finite_matrices_are_refused() {
         let mut dense = DenseFactor::default();
         for bad in [-1.0, f64::NAN] {
-            dense.matrix(2).copy_from_slice(&[1.0, 0.0, 0.0, bad]);
+            dense.put_matrix(vec![1.0, 0.0, 0.0, bad], 2);
             assert_eq!(dense.factorize(), Err(NotPositiveDefinite));
         }
     }

@@ -90,7 +90,10 @@ impl FactorCache {
                 }
             };
             let values = system::assemble(&body.model, &body.material, &key.pins, key.system, h, &symbolic);
-            let factor = symbolic.factorize(&values, &mut self.scratch).ok()?;
+            let mut factor = symbolic.factorize(&values, &mut self.scratch).ok()?;
+            if system::in_single_precision(body, h, &symbolic, &values) {
+                factor = factor.rounded();
+            }
             work.factorizations = 1;
             let made = SystemFactor {
                 symbolic,
@@ -116,7 +119,7 @@ impl FactorCache {
 
     /// Bytes of all numeric factors.
     pub fn factor_bytes(&self) -> usize {
-        self.factors.values().map(|f| f.symbolic.factor_bytes()).sum()
+        self.factors.values().map(|f| f.factor.bytes()).sum()
     }
 
     /// Bytes of all columns.

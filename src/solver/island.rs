@@ -65,6 +65,7 @@ impl Island {
         if !self.contacts.is_empty() {
             self.contacts.begin(&mut self.bodies, partners, h, limits);
             self.contacts.assemble(&self.bodies, &factors, partners, h);
+            self.contacts.expect();
         }
         self.accelerations.resize_with(self.bodies.len(), Lbfgs::default);
         self.accelerations.iter_mut().for_each(Lbfgs::clear);
@@ -89,6 +90,9 @@ impl Island {
                     self.contacts.assemble(&self.bodies, &factors, partners, h);
                 }
             }
+        }
+        if self.contacts.is_empty() {
+            self.bodies.iter_mut().filter(|b| b.key.pins.is_empty()).for_each(BodyProblem::balance);
         }
     }
 

@@ -224,9 +224,11 @@ impl Metric {
 
 /// A rotation rounded to quaternion components of 2⁻²⁰.
 fn rounded(rotation: &Mat3) -> Mat3 {
+    // Numbers next to this one are 2⁻²⁰ apart.
+    const COARSE: f64 = 1.5 * (1u64 << 32) as f64;
     let R = nalgebra::Rotation3::from_matrix_unchecked(*rotation);
     let q = nalgebra::UnitQuaternion::from_rotation_matrix(&R);
-    let coarse = q.coords.map(|c| (c * 1048576.0).round() / 1048576.0);
+    let coarse = q.coords.map(|c| (c + COARSE) - COARSE);
     nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::from_vector(coarse))
         .to_rotation_matrix()
         .into_inner()

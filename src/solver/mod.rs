@@ -5,6 +5,7 @@
 
 mod body_problem;
 mod columns;
+mod cone_hessian;
 mod cone_newton;
 mod contact_system;
 mod factor;

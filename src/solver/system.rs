@@ -6,7 +6,7 @@
 //! factor.
 
 use super::factor::Symbolic;
-use crate::body::{DeformableBody, DeformableModel, SystemMatrix};
+use crate::body::{DeformableBody, DeformableModel, FactorPrecision, SystemMatrix};
 use crate::energy::{ElementEnergy, with_energy};
 use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3};
@@ -16,6 +16,7 @@ use crate::math::{Mat3, Vec3};
 pub(crate) struct FactorKey {
     pub model: u64,
     pub system: SystemMatrix,
+    precision: FactorPrecision,
     elasticity: crate::energy::Elasticity,
     /// Bits of h, E, ν, ρ, α, β.
     bits: [u64; 6],
@@ -30,6 +31,7 @@ impl FactorKey {
         Self {
             model: body.model.id,
             system: body.settings().system,
+            precision: body.settings().precision,
             elasticity: m.elasticity,
             bits: [h, e, nu, rho, m.mass_damping, m.stiffness_damping].map(f64::to_bits),
             pins: body.pins.iter().map(|p| p.node).collect(),
@@ -107,6 +109,47 @@ pub(crate) fn assemble(
         }
     }
     values
+}
+
+/// Condition up to which a single-precision factor serves by itself: the softest mode is then off by
+/// less than a hundredth, which is less than an iteration leaves of the error anyway.
+const SINGLE_CONDITION: f64 = 1.0e5;
+/// Bytes of a factor that fit into a cache: beyond, solves wait for memory.
+const CACHED_BYTES: usize = 4 << 20;
+
+/// Whether the numbers of a body's factor are rounded to single precision.
+pub(crate) fn in_single_precision(
+    body: &DeformableBody,
+    h: f64,
+    symbolic: &Symbolic,
+    values: &[f64],
+) -> bool {
+    match body.settings().precision {
+        FactorPrecision::Double => false,
+        FactorPrecision::Single => true,
+        FactorPrecision::Automatic => {
+            !body.pins.is_empty()
+                && symbolic.factor_len() * size_of::<f64>() > CACHED_BYTES
+                && condition(body, h, symbolic, values) < SINGLE_CONDITION
+        }
+    }
+}
+
+/// An estimate: the largest row sum over what a body moving as a whole meets, the mean inertia.
+fn condition(body: &DeformableBody, h: f64, symbolic: &Symbolic, values: &[f64]) -> f64 {
+    let starts = symbolic.column_starts();
+    let mut sums = vec![0.0; starts.len() - 1];
+    for j in 0..sums.len() {
+        for k in starts[j]..starts[j + 1] {
+            let i = symbolic.rows()[k];
+            sums[i] += values[k].abs();
+            if i != j {
+                sums[j] += values[k].abs();
+            }
+        }
+    }
+    let largest = sums.into_iter().fold(0.0, f64::max);
+    largest * h * h * body.model.rest.len() as f64 / body.mass()
 }
 
 /// The upper triangle being filled, block by block.

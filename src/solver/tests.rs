@@ -7,7 +7,9 @@ use super::factor_cache::FactorCache;
 use super::island::Island;
 use super::partner::{Partner, Reaction};
 use super::system::{FactorKey, assemble};
-use crate::body::{ContactKey, DeformableBody, DeformableBodyBuilder, Frames, SolverSettings, SystemMatrix};
+use crate::body::{
+    ContactKey, DeformableBody, DeformableBodyBuilder, FactorPrecision, Frames, SolverSettings, SystemMatrix,
+};
 use crate::contact::{PartnerId, Row, Side, cone};
 use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3};
@@ -132,6 +134,33 @@ fn delassus_blocks_are_what_the_metric_does() {
 }
 
 #[test]
+fn rounded_factors_have_the_columns_that_they_solve_for() {
+    let solved = |precision: FactorPrecision| {
+        let mut body = body(SystemMatrix::RestStiffness, Frames::Floating, false);
+        body.set_settings(SolverSettings { precision, ..*body.settings() });
+        let mut cache = FactorCache::default();
+        let key = FactorKey::new(&body, H);
+        cache.prepare(&key, &body, H, [3, 8].into_iter()).unwrap();
+        let factor = cache.get(&key).unwrap();
+        let nodes = &body.model.surface.nodes;
+        let mut push = vec![0.0; 3 * body.model.rest.len()];
+        push[3 * nodes[8] as usize + 1] = 1.0;
+        let mut scratch = super::factor::FactorScratch::default();
+        factor.symbolic.solve(&factor.factor, &mut push, &mut scratch);
+        let moved = Vec3::from_column_slice(&push[3 * nodes[3] as usize..][..3]);
+        (factor.factor.bytes(), moved, factor.columns.block(3, 8).column(1).into_owned())
+    };
+    let (bytes, exact, _) = solved(FactorPrecision::Double);
+    let (half, moved, column) = solved(FactorPrecision::Single);
+    assert_eq!(2 * half, bytes);
+    // The same factor twice, of a matrix of condition 1e3.
+    assert!((moved - column).norm() < 1e-12 * column.norm());
+    // 6e-8 of the norm against the softest mode.
+    let error = (moved - exact).norm() / exact.norm();
+    assert!((1e-12..1e-3).contains(&error), "{error:e}");
+}
+
+#[test]
 fn translation_is_exact_in_every_metric() {
     for (system, frames) in [
         (SystemMatrix::Laplacian, Frames::Floating),
@@ -167,6 +196,7 @@ fn random_problem(contacts: usize, rank: usize, mu: f64, numbers: &[f64]) -> Con
     ConeProblem {
         offsets: (0..=contacts).map(|i| 3 * i).collect(),
         friction: vec![mu; contacts],
+        version: 0,
         W: W.as_slice().to_vec(),
         g: g.as_slice().to_vec(),
     }

@@ -16,12 +16,18 @@ pub(crate) struct Supernodes {
     pub value_begin: Vec<usize>,
 }
 
+/// A number of a factor: single or double precision, computed with in double.
+pub(crate) trait Entry: Copy + Into<f64> {}
+
+impl Entry for f32 {}
+impl Entry for f64 {}
+
 /// Columns that one pass over the rows takes together.
 const GROUP: usize = 4;
 
 impl Supernodes {
     /// Solves `L Lᵀ x = b` in place; `gathered` is memory for the longest column.
-    pub fn solve(&self, values: &[f64], x: &mut [f64], gathered: &mut Vec<f64>) {
+    pub fn solve<T: Entry>(&self, values: &[T], x: &mut [f64], gathered: &mut Vec<f64>) {
         #[cfg(target_arch = "x86_64")]
         if std::is_x86_feature_detected!("avx2") {
             // SAFETY: the feature was just detected. No fused operations: the same bits as below.
@@ -32,12 +38,12 @@ impl Supernodes {
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn solve_avx2(&self, values: &[f64], x: &mut [f64], gathered: &mut Vec<f64>) {
+    fn solve_avx2<T: Entry>(&self, values: &[T], x: &mut [f64], gathered: &mut Vec<f64>) {
         self.solve_with(values, x, gathered);
     }
 
     #[inline(always)]
-    fn solve_with(&self, values: &[f64], x: &mut [f64], gathered: &mut Vec<f64>) {
+    fn solve_with<T: Entry>(&self, values: &[T], x: &mut [f64], gathered: &mut Vec<f64>) {
         let count = self.begin.len() - 1;
         for s in 0..count {
             self.forward(s, values, x, gathered);
@@ -49,84 +55,87 @@ impl Supernodes {
 
     /// Columns, rows below, and values of a supernode.
     #[inline(always)]
-    fn parts<'a>(&'a self, s: usize, values: &'a [f64]) -> (std::ops::Range<usize>, &'a [usize], &'a [f64]) {
+    pub fn parts<'a, T>(
+        &'a self,
+        s: usize,
+        values: &'a [T],
+    ) -> (std::ops::Range<usize>, &'a [usize], &'a [T]) {
         let columns = self.begin[s]..self.begin[s + 1];
         let rows = &self.rows[self.row_begin[s]..self.row_begin[s + 1]];
         let size = columns.len() * (columns.len() + rows.len());
         (columns, rows, &values[self.value_begin[s]..self.value_begin[s] + size])
     }
 
+    /// `work` holds the unknowns of the supernode and then what it adds to those of the rows below.
     #[inline(always)]
-    fn forward(&self, s: usize, values: &[f64], x: &mut [f64], gathered: &mut Vec<f64>) {
+    fn forward<T: Entry>(&self, s: usize, values: &[T], x: &mut [f64], work: &mut Vec<f64>) {
         let (columns, rows, L) = self.parts(s, values);
         let (n, m) = (columns.len(), columns.len() + rows.len());
-        let top = &mut x[columns];
-        for j in 0..n {
-            let column = &L[j * m..j * m + n];
-            let xj = top[j] / column[j];
-            top[j] = xj;
-            for i in j + 1..n {
-                top[i] -= column[i] * xj;
-            }
-        }
-        if rows.is_empty() {
-            return;
-        }
-        gathered.clear();
-        gathered.resize(rows.len(), 0.0);
-        let below = |j: usize| &L[j * m + n..(j + 1) * m];
+        work.clear();
+        work.extend_from_slice(&x[columns.clone()]);
+        work.resize(m, 0.0);
+        let column = |j: usize| &L[j * m..(j + 1) * m];
         let mut j = 0;
         while j + GROUP <= n {
-            let (a, b, c, d) = (below(j), below(j + 1), below(j + 2), below(j + 3));
-            let w = [top[j], top[j + 1], top[j + 2], top[j + 3]];
-            for (i, g) in gathered.iter_mut().enumerate() {
-                *g += (a[i] * w[0] + b[i] * w[1]) + (c[i] * w[2] + d[i] * w[3]);
+            let (head, below) = work.split_at_mut(j + GROUP);
+            let w = &mut head[j..];
+            for k in 0..GROUP {
+                let diagonal = &column(j + k)[j..j + GROUP];
+                w[k] /= diagonal[k].into();
+                for i in k + 1..GROUP {
+                    w[i] -= diagonal[i].into() * w[k];
+                }
+            }
+            let [a, b, c, d] = [0, 1, 2, 3].map(|k| &column(j + k)[j + GROUP..]);
+            let w = [w[0], w[1], w[2], w[3]];
+            for (i, g) in below.iter_mut().enumerate() {
+                *g -= (a[i].into() * w[0] + b[i].into() * w[1]) + (c[i].into() * w[2] + d[i].into() * w[3]);
             }
             j += GROUP;
         }
         for j in j..n {
-            for (g, l) in gathered.iter_mut().zip(below(j)) {
-                *g += l * top[j];
+            let (head, below) = work.split_at_mut(j + 1);
+            head[j] /= column(j)[j].into();
+            for (g, l) in below.iter_mut().zip(&column(j)[j + 1..]) {
+                *g -= (*l).into() * head[j];
             }
         }
-        for (&row, g) in rows.iter().zip(gathered.iter()) {
-            x[row] -= g;
+        x[columns].copy_from_slice(&work[..n]);
+        for (&row, g) in rows.iter().zip(&work[n..]) {
+            x[row] += g;
         }
     }
 
     #[inline(always)]
-    fn backward(&self, s: usize, values: &[f64], x: &mut [f64], gathered: &mut Vec<f64>) {
+    fn backward<T: Entry>(&self, s: usize, values: &[T], x: &mut [f64], work: &mut Vec<f64>) {
         let (columns, rows, L) = self.parts(s, values);
         let (n, m) = (columns.len(), columns.len() + rows.len());
-        gathered.clear();
-        gathered.extend(rows.iter().map(|&row| x[row]));
-        let top = &mut x[columns];
-        let below = |j: usize| &L[j * m + n..(j + 1) * m];
-        if !rows.is_empty() {
-            let mut j = 0;
-            while j + GROUP <= n {
-                let sums = dots([below(j), below(j + 1), below(j + 2), below(j + 3)], gathered);
-                (0..GROUP).for_each(|k| top[j + k] -= sums[k]);
-                j += GROUP;
-            }
-            for j in j..n {
-                top[j] -= dots([below(j)], gathered)[0];
+        work.clear();
+        work.extend_from_slice(&x[columns.clone()]);
+        work.extend(rows.iter().map(|&row| x[row]));
+        let column = |j: usize| &L[j * m..(j + 1) * m];
+        let grouped = n / GROUP * GROUP;
+        for j in (grouped..n).rev() {
+            let (head, below) = work.split_at_mut(j + 1);
+            head[j] = (head[j] - dots([&column(j)[j + 1..]], below)[0]) / column(j)[j].into();
+        }
+        for j in (0..grouped).step_by(GROUP).rev() {
+            let (head, below) = work.split_at_mut(j + GROUP);
+            let w = &mut head[j..];
+            let sums = dots([0, 1, 2, 3].map(|k| &column(j + k)[j + GROUP..]), below);
+            for k in (0..GROUP).rev() {
+                let diagonal = &column(j + k)[j..j + GROUP];
+                let known: f64 = (k + 1..GROUP).map(|i| diagonal[i].into() * w[i]).sum();
+                w[k] = (w[k] - sums[k] - known) / diagonal[k].into();
             }
         }
-        for j in (0..n).rev() {
-            let column = &L[j * m..j * m + n];
-            let mut sum = top[j];
-            for i in j + 1..n {
-                sum -= column[i] * top[i];
-            }
-            top[j] = sum / column[j];
-        }
+        x[columns].copy_from_slice(&work[..n]);
     }
 }
 
 /// Scalar products of some columns with one vector, each as four interleaved sums.
 #[inline(always)]
-fn dots<const N: usize>(columns: [&[f64]; N], v: &[f64]) -> [f64; N] {
+fn dots<T: Entry, const N: usize>(columns: [&[T]; N], v: &[f64]) -> [f64; N] {
     const LANES: usize = 4;
     let mut sums = [[0.0; LANES]; N];
     let whole = v.len() / LANES * LANES;
@@ -135,13 +144,13 @@ fn dots<const N: usize>(columns: [&[f64]; N], v: &[f64]) -> [f64; N] {
         for k in 0..N {
             let c = &columns[k][i..i + LANES];
             for l in 0..LANES {
-                sums[k][l] += c[l] * w[l];
+                sums[k][l] += c[l].into() * w[l];
             }
         }
     }
     let mut out = [0.0; N];
     for k in 0..N {
-        let tail: f64 = columns[k][whole..].iter().zip(&v[whole..]).map(|(c, w)| c * w).sum();
+        let tail: f64 = columns[k][whole..].iter().zip(&v[whole..]).map(|(c, w)| (*c).into() * w).sum();
         out[k] = (sums[k][0] + sums[k][1]) + (sums[k][2] + sums[k][3]) + tail;
     }
     out

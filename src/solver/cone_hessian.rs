@@ -1,0 +1,166 @@
+//! The matrix of a Newton step of the contact problem, factored: `I + LᵀWL`, with `L Lᵀ` the
+//! curvature of the contacts. By Woodbury's identity it gives `(1 + L Lᵀ W)⁻¹ b` [Castro et al. 2022].
+
+use super::cone_newton::ConeProblem;
+use super::factor::DenseFactor;
+use crate::contact::cone;
+
+/// Curvatures of all contacts and the factor they lead to.
+#[derive(Default)]
+pub(crate) struct ConeHessian {
+    /// Columns of L per contact: their rows are those of the contact.
+    columns: Vec<[[f64; 3]; 3]>,
+    offsets: Vec<usize>,
+    factor: DenseFactor,
+    /// What the factor was made of: the same bits, the same factor.
+    factored: Option<Factored>,
+    spare: Factored,
+    product: Vec<f64>,
+    reduced: Vec<f64>,
+}
+
+#[derive(Default)]
+struct Factored {
+    version: u64,
+    columns: Vec<[[f64; 3]; 3]>,
+    offsets: Vec<usize>,
+}
+
+impl ConeHessian {
+    /// Takes the curvatures at the points u with regularisation R per contact.
+    pub fn set_curvature(&mut self, problem: &ConeProblem, u: &[f64], R: &[f64]) {
+        self.columns.clear();
+        self.offsets.clear();
+        self.offsets.push(0);
+        let mut size = 0;
+        for i in 0..problem.contacts() {
+            let u = spatial(&u[problem.offsets[i]..problem.offsets[i + 1]]);
+            let mut columns = [[0.0; 3]; 3];
+            size += cone::curvature_columns(u, problem.friction[i], R[i], &mut columns);
+            self.columns.push(columns);
+            self.offsets.push(size);
+        }
+    }
+
+    /// The columns of L of a contact.
+    pub fn columns_of(&self, contact: usize) -> &[[f64; 3]] {
+        let count = self.offsets[contact + 1] - self.offsets[contact];
+        &self.columns[contact][..count]
+    }
+
+    /// Order of the matrix: 0 if nothing touches.
+    pub fn order(&self) -> usize {
+        self.offsets.last().copied().unwrap_or(0)
+    }
+
+    /// Factors the matrix, unless it is the one that was factored last; tells whether it had to, or
+    /// `None` if that failed.
+    pub fn factorize(&mut self, problem: &ConeProblem) -> Option<bool> {
+        if let Some(f) = &self.factored {
+            let same = f.version == problem.version && f.offsets == self.offsets && f.columns == self.columns;
+            if same {
+                return Some(false);
+            }
+            self.spare = self.factored.take()?;
+        }
+        self.assemble(problem);
+        self.factor.factorize().ok()?;
+        let mut made = std::mem::take(&mut self.spare);
+        made.version = problem.version;
+        made.columns.clone_from(&self.columns);
+        made.offsets.clone_from(&self.offsets);
+        self.factored = Some(made);
+        Some(true)
+    }
+
+    /// Turns `b` to `b − L(I + LᵀWL)⁻¹Lᵀ Wb`, given the product Wb.
+    pub fn solve(&mut self, problem: &ConeProblem, b: &mut [f64], Wb: &[f64]) {
+        let mut reduced = std::mem::take(&mut self.reduced);
+        reduced.clear();
+        for i in 0..problem.contacts() {
+            let rows = spatial(&Wb[problem.offsets[i]..problem.offsets[i + 1]]);
+            reduced.extend(self.columns_of(i).iter().map(|c| dot(c, &rows)));
+        }
+        self.factor.solve(&mut reduced);
+        for i in 0..problem.contacts() {
+            for (c, k) in self.columns_of(i).iter().zip(self.offsets[i]..) {
+                let rows = problem.offsets[i]..problem.offsets[i + 1];
+                b[rows].iter_mut().zip(c).for_each(|(b, c)| *b -= c * reduced[k]);
+            }
+        }
+        self.reduced = reduced;
+    }
+
+    fn assemble(&mut self, problem: &ConeProblem) {
+        #[cfg(target_arch = "x86_64")]
+        if std::is_x86_feature_detected!("avx2") {
+            // SAFETY: the feature was just detected. No fused operations: the same bits as below.
+            return unsafe { self.assemble_avx2(problem) };
+        }
+        self.assemble_columns(problem);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn assemble_avx2(&mut self, problem: &ConeProblem) {
+        self.assemble_columns(problem);
+    }
+
+    /// The lower triangle, column by column: first the product of W with a column of L, then that of
+    /// its rows with the other columns.
+    #[inline(always)]
+    fn assemble_columns(&mut self, problem: &ConeProblem) {
+        let (size, m) = (self.order(), problem.rows());
+        let mut product = std::mem::take(&mut self.product);
+        product.resize(m, 0.0);
+        let mut matrix = self.factor.take_matrix(size);
+        for j in 0..problem.contacts() {
+            let first = problem.offsets[j];
+            for (c, column) in self.columns_of(j).iter().enumerate() {
+                let at = self.offsets[j] + c;
+                let W = |k: usize| &problem.W[(first + k) * m + first..(first + k + 1) * m];
+                let below = &mut product[first..];
+                if problem.offsets[j + 1] - first == 3 {
+                    let (a, b, c) = (W(0), W(1), W(2));
+                    for (i, p) in below.iter_mut().enumerate() {
+                        *p = column[0] * a[i] + column[1] * b[i] + column[2] * c[i];
+                    }
+                } else {
+                    below.iter_mut().zip(W(0)).for_each(|(p, w)| *p = column[0] * w);
+                }
+                let entries = &mut matrix[at * size..(at + 1) * size];
+                for i in j..problem.contacts() {
+                    let rows = &product[problem.offsets[i]..problem.offsets[i + 1]];
+                    let entries = &mut entries[self.offsets[i]..self.offsets[i + 1]];
+                    match (rows, entries) {
+                        // Sticking: L is a multiple of the identity.
+                        ([x, y, z], [a, b, c]) => {
+                            let root = self.columns[i][0][0];
+                            (*a, *b, *c) = (root * x, root * y, root * z);
+                        }
+                        (rows, entries) => {
+                            let rows = spatial(rows);
+                            let columns = self.columns[i].iter();
+                            entries.iter_mut().zip(columns).for_each(|(e, c)| *e = dot(c, &rows));
+                        }
+                    }
+                }
+                entries[at] += 1.0;
+            }
+        }
+        self.factor.put_matrix(matrix, size);
+        self.product = product;
+    }
+}
+
+pub(crate) fn spatial(rows: &[f64]) -> [f64; 3] {
+    match rows {
+        [n, t1, t2] => [*n, *t1, *t2],
+        [n, ..] => [*n, 0.0, 0.0],
+        [] => [0.0; 3],
+    }
+}
+
+pub(crate) fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
