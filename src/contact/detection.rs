@@ -119,7 +119,7 @@ impl Detector {
         if obstacle.is_faceted() {
             one_row_per_feature(rows, first);
         }
-        rows[first..].sort_by_key(|r| r.key);
+        rows[first..].sort_unstable_by_key(|r| r.key);
     }
 
     fn detect_nodes(&mut self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
@@ -322,7 +322,7 @@ fn near(extent: &Aabb, p: &Vec3, reach: f64) -> bool {
 /// Of the rows from `first` on that name one feature, the deepest stays.
 fn one_row_per_feature(rows: &mut Vec<Row>, first: usize) {
     rows[first..].iter_mut().for_each(|r| r.key.slot = 0);
-    rows[first..].sort_by(|a, b| a.key.cmp(&b.key).then(a.gap.total_cmp(&b.gap)));
+    rows[first..].sort_unstable_by(|a, b| a.key.cmp(&b.key).then(a.gap.total_cmp(&b.gap)));
     let mut kept = first;
     for i in first..rows.len() {
         if kept == first || rows[kept - 1].key != rows[i].key {

@@ -76,7 +76,7 @@ pub(crate) fn corners_in(obstacle: &Obstacle, region: &Aabb, found: &mut Vec<(u3
                     take(number, mesh.vertices()[number as usize]);
                 }
             }
-            found.sort_by_key(|(number, _)| *number);
+            found.sort_unstable_by_key(|(number, _)| *number);
             found.dedup_by_key(|(number, _)| *number);
         }
         _ => {}

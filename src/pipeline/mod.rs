@@ -1,6 +1,7 @@
 //! The step, told as a list of verbs, and the world that owns it.
 
 mod contacts;
+mod grouping;
 mod parameters;
 #[allow(clippy::module_inception)]
 mod pipeline;

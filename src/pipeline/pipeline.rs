@@ -6,6 +6,7 @@
 //! ```
 
 use super::contacts::DeformableContact;
+use super::grouping::Grouping;
 use super::parameters::{DeformableCounters, DeformableParameters};
 use super::threads::for_each;
 use super::work::{BodyWork, IslandWork};
@@ -34,6 +35,7 @@ pub struct DeformablePipeline {
     works: Vec<BodyWork>,
     factors: FactorCache,
     islands: Vec<IslandWork>,
+    grouping: Grouping,
     reaction_list: Vec<Reaction>,
     reactions: Reactions,
     contacts: Vec<DeformableContact>,
@@ -131,7 +133,9 @@ impl DeformablePipeline {
                 continue;
             }
             let work = self.idle.remove(&handle);
-            self.works.push(work.unwrap_or_else(|| BodyWork::new(handle)));
+            let mut work = work.unwrap_or_else(|| BodyWork::new(handle));
+            work.index = self.works.len();
+            self.works.push(work);
         }
         // What is left belongs to bodies that were removed or disabled.
         self.idle.clear();
@@ -142,10 +146,9 @@ impl DeformablePipeline {
 
     fn detect(&mut self, deformables: &DeformableBodySet, sets: RapierSets<'_>) {
         let (scene, candidates) = (&self.scene, &self.candidates);
-        let mut numbered: Vec<(usize, &mut BodyWork)> = self.works.iter_mut().enumerate().collect();
-        for_each(&mut numbered, |(index, work)| {
+        for_each(&mut self.works, |work| {
             let body = &deformables[work.handle];
-            work.detect(*index, body, scene, candidates, sets);
+            work.detect(body, scene, candidates, sets);
         });
         self.counters.pairs = self.works.iter().map(|w| w.pairs).sum();
         self.counters.contacts = self.works.iter().map(|w| w.rows.len()).sum();
@@ -154,7 +157,7 @@ impl DeformablePipeline {
     fn prepare_factors(&mut self, deformables: &mut DeformableBodySet, h: f64, column_budget: usize) {
         self.factors.begin_step(column_budget);
         let (factors, counters) = (&mut self.factors, &mut self.counters);
-        self.works.retain(|work| {
+        self.works.retain_mut(|work| {
             let (Some(problem), Some(body)) = (&work.problem, deformables.get_mut(work.handle)) else {
                 return false;
             };
@@ -163,6 +166,7 @@ impl DeformablePipeline {
                 quarantine(body, counters);
                 return false;
             };
+            work.set_factor(done.id);
             counters.factorizations += done.factorizations;
             counters.columns += done.columns;
             true
@@ -171,51 +175,8 @@ impl DeformablePipeline {
         self.counters.column_bytes = self.factors.column_bytes();
     }
 
-    /// Bodies that share a yielding partner are solved together.
     fn form_islands(&mut self) {
-        let mut root: Vec<usize> = (0..self.works.len()).collect();
-        let mut first_on_partner: HashMap<u32, usize> = HashMap::new();
-        for (index, work) in self.works.iter().enumerate() {
-            for side in work.rows.iter().flat_map(|row| &row.sides) {
-                let Side::Partner { partner, .. } = side else { continue };
-                if self.scene.partners[partner.0 as usize].yields() {
-                    let other = *first_on_partner.entry(partner.0).or_insert(index);
-                    let (a, b) = (find(&mut root, other), find(&mut root, index));
-                    root[a.max(b)] = a.min(b);
-                }
-            }
-        }
-        let mut island_of_root: HashMap<usize, usize> = HashMap::new();
-        for island in &mut self.islands {
-            island.members.clear();
-            island.island.contacts.rows.clear();
-        }
-        let mut count = 0;
-        for index in 0..self.works.len() {
-            let key = find(&mut root, index);
-            let place = *island_of_root.entry(key).or_insert_with(|| {
-                count += 1;
-                count - 1
-            });
-            if place == self.islands.len() {
-                self.islands.push(IslandWork::default());
-            }
-            let island = &mut self.islands[place];
-            let local = island.members.len();
-            island.members.push(index);
-            let work = &mut self.works[index];
-            island.island.bodies.extend(work.problem.take());
-            for mut row in work.rows.drain(..) {
-                for side in &mut row.sides {
-                    if let Side::Soft { body, .. } = side {
-                        *body = local;
-                    }
-                }
-                island.island.contacts.rows.push(row);
-            }
-        }
-        self.islands.truncate(count);
-        self.counters.islands = count;
+        self.counters.islands = self.grouping.form(&mut self.works, &self.scene.partners, &mut self.islands);
     }
 
     fn solve(&mut self, parameters: &DeformableParameters, h: f64) {
@@ -240,9 +201,7 @@ impl DeformablePipeline {
                 let Some(body) = deformables.get_mut(handle) else { continue };
                 if finite {
                     store(body, work, local, h, &mut self.counters);
-                } else if work.island.report.unsolvable
-                    || !work.island.bodies[local].current.x.iter().all(is_number)
-                {
+                } else if !work.island.bodies[local].current.x.iter().all(is_number) {
                     quarantine(body, &mut self.counters);
                 }
             }
@@ -325,15 +284,6 @@ fn list_contacts(
             gap: system.final_gap(i),
         });
     }
-}
-
-fn find(root: &mut [usize], i: usize) -> usize {
-    let mut at = i;
-    while root[at] != at {
-        root[at] = root[root[at]];
-        at = root[at];
-    }
-    at
 }
 
 struct Clock(Instant);

@@ -4,11 +4,13 @@ use crate::body::{ContactMemory, DeformableBody, DeformableBodyHandle, is_number
 use crate::contact::{Candidates, Detector, Pair, Row, Side};
 use crate::coupling::{RapierScene, RapierSets, combined};
 use crate::math::Vec3;
-use crate::solver::{BodyProblem, Island};
+use crate::solver::{BodyProblem, FactorId, Island};
 
 /// One body within a step.
 pub(super) struct BodyWork {
     pub handle: DeformableBodyHandle,
+    /// Place in the step's list.
+    pub index: usize,
     /// `None` while an island has it.
     pub problem: Option<BodyProblem>,
     pub rows: Vec<Row>,
@@ -21,6 +23,7 @@ impl BodyWork {
     pub fn new(handle: DeformableBodyHandle) -> Self {
         Self {
             handle,
+            index: 0,
             problem: None,
             rows: Vec::new(),
             pairs: 0,
@@ -37,10 +40,9 @@ impl BodyWork {
         }
     }
 
-    /// Finds the body's contacts; `index` is its place in the step's list.
+    /// Finds the body's contacts.
     pub fn detect(
         &mut self,
-        index: usize,
         body: &DeformableBody,
         scene: &RapierScene,
         candidates: &Candidates,
@@ -58,7 +60,7 @@ impl BodyWork {
                 continue;
             };
             let obstacle = &scene.obstacles[o as usize];
-            let pair = Pair { body: index, friction, restitution };
+            let pair = Pair { body: self.index, friction, restitution };
             self.pairs += 1;
             let memory = body.state.contacts_with(obstacle.key, obstacle.part);
             self.detector.detect(&pair, obstacle, model, x, memory, &mut self.rows);
@@ -77,7 +79,14 @@ impl BodyWork {
             }
             !held || row.sides.iter().any(yields)
         });
-        self.rows.sort_by_key(|row| row.key);
+        self.rows.sort_unstable_by_key(|row| row.key);
+    }
+
+    /// Tells where the body's factor is kept in this step.
+    pub fn set_factor(&mut self, id: FactorId) {
+        if let Some(problem) = &mut self.problem {
+            problem.factor = id;
+        }
     }
 
     /// Surface nodes (as indices into the model's list) that the contacts act on.
@@ -96,10 +105,24 @@ pub(super) struct IslandWork {
 }
 
 impl IslandWork {
+    /// Takes over the problem and the rows of the body at `index` of the step's list.
+    pub fn take_in(&mut self, index: usize, work: &mut BodyWork) {
+        let local = self.members.len();
+        self.members.push(index);
+        self.island.bodies.extend(work.problem.take());
+        for mut row in work.rows.drain(..) {
+            for side in &mut row.sides {
+                if let Side::Soft { body, .. } = side {
+                    *body = local;
+                }
+            }
+            self.island.contacts.rows.push(row);
+        }
+    }
+
     /// Whether every number that leaves the island is finite.
     pub fn is_finite(&self) -> bool {
-        !self.island.report.unsolvable
-            && self.island.bodies.iter().all(|b| b.current.x.iter().all(is_number))
+        self.island.bodies.iter().all(|b| b.current.x.iter().all(is_number))
             && self.island.contacts.lambda.iter().all(|l| l.is_finite())
     }
 

@@ -4,7 +4,7 @@
 //! `s = x_n + h v_n + h² M⁻¹ f_ext` [Bouaziz et al. 2014], E the elastic energy with the stiffness
 //! damping of the step. The residual is `r = −∂Ψ/∂x` \[N\]; pinned nodes are not unknowns.
 
-use super::factor_cache::SystemFactor;
+use super::factor_cache::{FactorId, SystemFactor};
 use super::metric::Metric;
 use super::system::FactorKey;
 use crate::body::elastic::{self, StiffnessDamping};
@@ -25,6 +25,8 @@ const MAX_BALANCING_TURN: f64 = 0.1;
 /// A body's step in the making.
 pub(crate) struct BodyProblem {
     pub key: FactorKey,
+    /// To be set when the factor is prepared.
+    pub factor: FactorId,
     pub model: Arc<DeformableModel>,
     pub settings: SolverSettings,
     material: DeformableMaterial,
@@ -49,6 +51,7 @@ pub(crate) struct BodyProblem {
     /// A force that counts as large for this body \[N\].
     pub weight: f64,
     step: Vec<Vec3>,
+    force: Vec<Vec3>,
     /// The body's frame at the start of the iteration.
     frame: Mat3,
     /// Where the pinned nodes would go by inertia and external forces.
@@ -75,6 +78,7 @@ impl BodyProblem {
         let n = body.state.x.len();
         let mut problem = Self {
             key: FactorKey::new(body, h),
+            factor: FactorId::default(),
             model: body.model.clone(),
             settings: *body.settings(),
             material: body.material,
@@ -93,6 +97,7 @@ impl BodyProblem {
             guard_retries: 0,
             weight: 0.0,
             step: vec![Vec3::zeros(); n],
+            force: Vec::new(),
             frame: Mat3::identity(),
             pinned_inertia: Vec::new(),
         };
@@ -103,7 +108,7 @@ impl BodyProblem {
     /// As [`BodyProblem::new`], in the memory of an earlier step.
     pub fn begin(&mut self, body: &DeformableBody, h: f64, gravity: &Vec3) {
         let n = body.state.x.len();
-        self.key = FactorKey::new(body, h);
+        self.key.update(body, h);
         self.settings = *body.settings();
         self.material = body.material;
         self.h = h;
@@ -175,7 +180,8 @@ impl BodyProblem {
         if per_node {
             let mobility = self.h * self.h / (1.0 + self.material.mass_damping * self.h);
             let (x, masses) = (&self.current.x, &self.masses);
-            self.metric.set_per_node(&self.model, x, masses, mobility, &self.key, factor);
+            let is_free = self.key.pins.is_empty();
+            self.metric.set_per_node(&self.model, x, masses, mobility, is_free, factor);
         } else {
             self.metric.set_floating(turned);
         }
@@ -194,10 +200,12 @@ impl BodyProblem {
 
     /// Sets the trial to `x + P(r + Jᵀλ⁰)/c`.
     pub fn free_step(&mut self, factor: &SystemFactor) {
-        let force = self.free_residual();
+        let mut force = std::mem::take(&mut self.force);
+        self.free_residual(&mut force);
         self.trial.x.clone_from(&self.current.x);
         self.metric.apply(factor, &force, &mut self.step);
         self.add_step();
+        self.force = force;
     }
 
     /// Adds `P Jᵀ(λ − λ⁰)/c` to the trial.
@@ -279,18 +287,10 @@ impl BodyProblem {
     }
 
     /// `r + Jᵀλ⁰`, zero at pinned nodes \[N\].
-    pub fn free_residual(&self) -> Vec<Vec3> {
-        let sums = self.current.r.iter().zip(&self.contact_force).map(|(r, f)| r + f);
-        let mut r: Vec<Vec3> = sums.collect();
-        self.key.pins.iter().for_each(|&p| r[p as usize] = Vec3::zeros());
-        r
-    }
-
-    /// `P f` \[m\].
-    pub fn preconditioned(&mut self, f: &[Vec3], factor: &SystemFactor) -> Vec<Vec3> {
-        let mut out = vec![Vec3::zeros(); f.len()];
-        self.metric.apply(factor, f, &mut out);
-        out
+    pub fn free_residual(&self, out: &mut Vec<Vec3>) {
+        out.clear();
+        out.extend(self.current.r.iter().zip(&self.contact_force).map(|(r, f)| r + f));
+        self.key.pins.iter().for_each(|&p| out[p as usize] = Vec3::zeros());
     }
 
     /// Force \[N\] with which the `k`-th pin holds its node.

@@ -5,9 +5,8 @@
 
 use super::body_problem::BodyProblem;
 use super::cone_newton::{ConeProblem, ConeSolver, ConeTolerance, ConeWork};
-use super::factor_cache::SystemFactor;
+use super::factor_cache::{FactorCache, SystemFactor};
 use super::partner::{Partner, Reaction};
-use super::system::FactorKey;
 use crate::contact::{Row, Side};
 use crate::math::{Mat3, Vec3};
 
@@ -38,13 +37,21 @@ pub(crate) struct ContactSystem {
 struct Ingredients {
     bits: Vec<f64>,
     nodes: Vec<u32>,
-    factors: Vec<FactorKey>,
+    /// Serial numbers.
+    factors: Vec<u64>,
     /// Frames per node are too many to compare.
     comparable: bool,
 }
 
 impl Ingredients {
-    fn describe(&mut self, rows: &[Row], bodies: &[BodyProblem], partners: &[Partner], h: f64) {
+    fn describe(
+        &mut self,
+        rows: &[Row],
+        bodies: &[BodyProblem],
+        factors: &FactorCache,
+        partners: &[Partner],
+        h: f64,
+    ) {
         self.bits.clear();
         self.nodes.clear();
         self.comparable = bodies.iter().all(|b| !b.metric.is_per_node());
@@ -52,7 +59,7 @@ impl Ingredients {
             return;
         }
         self.factors.clear();
-        self.factors.extend(bodies.iter().map(|b| b.key.clone()));
+        self.factors.extend(bodies.iter().map(|b| factors.get(b.factor).serial));
         self.bits.push(h);
         for body in bodies {
             self.bits.push(body.scaling);
@@ -126,15 +133,9 @@ impl ContactSystem {
 
     /// Assembles W for the current frames and scalings of the bodies, unless the last one was made of
     /// the same bits: so it is at rest.
-    pub fn assemble(
-        &mut self,
-        bodies: &[BodyProblem],
-        factors: &[&SystemFactor],
-        partners: &[Partner],
-        h: f64,
-    ) {
+    pub fn assemble(&mut self, bodies: &[BodyProblem], factors: &FactorCache, partners: &[Partner], h: f64) {
         let mut made_from = std::mem::take(&mut self.fresh);
-        made_from.describe(&self.rows, bodies, partners, h);
+        made_from.describe(&self.rows, bodies, factors, partners, h);
         if made_from.comparable && made_from == self.made_from {
             self.fresh = made_from;
             return self.problem.multiply(&self.lambda, &mut self.slips);
@@ -320,7 +321,7 @@ fn compliance(
     a: &Row,
     b: &Row,
     bodies: &[BodyProblem],
-    factors: &[&SystemFactor],
+    factors: &FactorCache,
     partners: &[Partner],
     h: f64,
 ) -> Option<Mat3> {
@@ -329,7 +330,7 @@ fn compliance(
         for (side_b, sign_b) in b.sides.iter().zip([1.0, -1.0]) {
             let term = match (side_a, side_b) {
                 (Side::Soft { body: i, .. }, Side::Soft { body: j, .. }) if i == j => {
-                    soft_compliance(side_a, side_b, a, b, &bodies[*i], factors[*i])
+                    soft_compliance(side_a, side_b, a, b, &bodies[*i], factors.get(bodies[*i].factor))
                 }
                 (Side::Partner { partner: i, point: p }, Side::Partner { partner: j, point: q })
                     if i == j && partners[i.0 as usize].yields() =>

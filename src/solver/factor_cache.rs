@@ -16,22 +16,33 @@ pub(crate) struct SystemFactor {
     pub factor: Factor,
     pub system: SystemMatrix,
     pub columns: Columns,
+    /// Different for every factor that a cache has made.
+    pub serial: u64,
+    key: FactorKey,
     model: Arc<DeformableModel>,
     last_used: u64,
 }
+
+/// Where a cache keeps a factor, for the present step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct FactorId(usize);
 
 /// All factors of a world.
 #[derive(Default)]
 pub(crate) struct FactorCache {
     symbolic: HashMap<(u64, SystemMatrix), Arc<Symbolic>>,
-    factors: HashMap<FactorKey, SystemFactor>,
+    factors: Vec<SystemFactor>,
+    places: HashMap<FactorKey, usize>,
     scratch: FactorScratch,
+    ages: Vec<u64>,
     step: u64,
+    made: u64,
 }
 
 /// What a call of [`FactorCache::prepare`] had to do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct CacheWork {
+    pub id: FactorId,
     pub factorizations: usize,
     pub columns: usize,
 }
@@ -47,27 +58,35 @@ impl FactorCache {
     pub fn begin_step(&mut self, column_budget: usize) {
         self.step += 1;
         let oldest = self.step.saturating_sub(UNUSED_STEPS);
-        self.factors.retain(|_, f| f.last_used >= oldest);
+        self.forget_before(oldest);
         // A material or a step that changes all the time must not fill the memory with old factors.
         let now = self.step;
-        let mut ages: Vec<u64> =
-            self.factors.values().map(|f| f.last_used).filter(|used| used + 1 < now).collect();
-        if ages.len() > MAX_UNUSED {
-            ages.sort_unstable();
-            let cutoff = ages[ages.len() - MAX_UNUSED];
-            self.factors.retain(|_, f| f.last_used >= cutoff);
+        self.ages.clear();
+        self.ages.extend(self.factors.iter().map(|f| f.last_used).filter(|used| used + 1 < now));
+        if self.ages.len() > MAX_UNUSED {
+            self.ages.sort_unstable();
+            let cutoff = self.ages[self.ages.len() - MAX_UNUSED];
+            self.forget_before(cutoff);
         }
-        let models: std::collections::HashSet<u64> = self.factors.keys().map(|k| k.model).collect();
-        self.symbolic.retain(|(model, _), _| models.contains(model));
         while self.column_bytes() > column_budget {
             let idle = |f: &&mut SystemFactor| f.columns.bytes() > 0;
-            let Some(oldest) =
-                self.factors.values_mut().filter(idle).min_by_key(|f| (f.last_used, f.model.id))
+            let Some(oldest) = self.factors.iter_mut().filter(idle).min_by_key(|f| (f.last_used, f.model.id))
             else {
                 return;
             };
             oldest.columns.clear();
         }
+    }
+
+    /// Forgets factors that were last used before this step.
+    fn forget_before(&mut self, oldest: u64) {
+        if self.factors.iter().all(|f| f.last_used >= oldest) {
+            return;
+        }
+        self.factors.retain(|f| f.last_used >= oldest);
+        self.places.clear();
+        self.places.extend(self.factors.iter().enumerate().map(|(place, f)| (f.key.clone(), place)));
+        self.symbolic.retain(|(model, _), _| self.factors.iter().any(|f| f.key.model == *model));
     }
 
     /// Makes sure the factor of a body and the inverse's columns at these surface nodes are there.
@@ -80,7 +99,7 @@ impl FactorCache {
         surface_nodes: impl Iterator<Item = u32>,
     ) -> Option<CacheWork> {
         let mut work = CacheWork::default();
-        if !self.factors.contains_key(key) {
+        if !self.places.contains_key(key) {
             let symbolic = match self.symbolic.get(&(key.model, key.system)) {
                 Some(symbolic) => symbolic.clone(),
                 None => {
@@ -100,12 +119,17 @@ impl FactorCache {
                 factor,
                 system: key.system,
                 columns: Columns::new(&body.model.surface, key.system),
+                serial: self.made,
+                key: key.clone(),
                 model: body.model.clone(),
                 last_used: self.step,
             };
-            self.factors.insert(key.clone(), made);
+            self.made += 1;
+            self.places.insert(key.clone(), self.factors.len());
+            self.factors.push(made);
         }
-        let entry = self.factors.get_mut(key)?;
+        work.id = FactorId(*self.places.get(key)?);
+        let entry = &mut self.factors[work.id.0];
         entry.last_used = self.step;
         let SystemFactor { symbolic, factor, columns, model, .. } = entry;
         work.columns = columns.prepare(model, &key.pins, symbolic, factor, surface_nodes, &mut self.scratch);
@@ -113,17 +137,17 @@ impl FactorCache {
     }
 
     /// A factor that was prepared in this step.
-    pub fn get(&self, key: &FactorKey) -> Option<&SystemFactor> {
-        self.factors.get(key)
+    pub fn get(&self, id: FactorId) -> &SystemFactor {
+        &self.factors[id.0]
     }
 
     /// Bytes of all numeric factors.
     pub fn factor_bytes(&self) -> usize {
-        self.factors.values().map(|f| f.factor.bytes()).sum()
+        self.factors.iter().map(|f| f.factor.bytes()).sum()
     }
 
     /// Bytes of all columns.
     pub fn column_bytes(&self) -> usize {
-        self.factors.values().map(|f| f.columns.bytes()).sum()
+        self.factors.iter().map(|f| f.columns.bytes()).sum()
     }
 }

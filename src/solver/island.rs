@@ -9,7 +9,7 @@
 use super::body_problem::BodyProblem;
 use super::cone_newton::ConeTolerance;
 use super::contact_system::{ContactLimits, ContactSystem};
-use super::factor_cache::{FactorCache, SystemFactor};
+use super::factor_cache::FactorCache;
 use super::lbfgs::Lbfgs;
 use super::partner::Partner;
 use crate::body::Acceleration;
@@ -30,8 +30,6 @@ pub(crate) struct IslandReport {
     pub newton_steps: usize,
     pub cone_factorizations: usize,
     pub cone_failures: usize,
-    /// Some factor was missing: the bodies could not be stepped.
-    pub unsolvable: bool,
 }
 
 /// What became of an iteration.
@@ -54,17 +52,12 @@ impl Island {
     /// contacts' forces.
     pub fn solve(&mut self, factors: &FactorCache, partners: &[Partner], h: f64, limits: &ContactLimits) {
         self.report = IslandReport::default();
-        let found: Option<Vec<&SystemFactor>> = self.bodies.iter().map(|b| factors.get(&b.key)).collect();
-        let Some(factors) = found else {
-            self.report.unsolvable = true;
-            return;
-        };
-        for (body, factor) in self.bodies.iter_mut().zip(&factors) {
-            body.choose_start(factor);
+        for body in &mut self.bodies {
+            body.choose_start(factors.get(body.factor));
         }
         if !self.contacts.is_empty() {
             self.contacts.begin(&mut self.bodies, partners, h, limits);
-            self.contacts.assemble(&self.bodies, &factors, partners, h);
+            self.contacts.assemble(&self.bodies, factors, partners, h);
             self.contacts.expect();
         }
         self.accelerations.resize_with(self.bodies.len(), Lbfgs::default);
@@ -73,7 +66,7 @@ impl Island {
         for iteration in 1..=iterations {
             self.report.iterations += 1;
             let last = iteration == iterations;
-            let outcome = self.iterate(&factors, partners, h, limits, last);
+            let outcome = self.iterate(factors, partners, h, limits, last);
             let converged =
                 |b: &BodyProblem| b.residual() <= b.settings.tolerance.max(ROUNDING) * b.force_scale();
             let done = match outcome {
@@ -87,7 +80,7 @@ impl Island {
             if !self.contacts.is_empty() {
                 let turned = self.bodies.iter_mut().filter_map(|b| b.refresh_frame().then_some(()));
                 if turned.count() > 0 {
-                    self.contacts.assemble(&self.bodies, &factors, partners, h);
+                    self.contacts.assemble(&self.bodies, factors, partners, h);
                 }
             }
         }
@@ -99,7 +92,7 @@ impl Island {
     /// One iteration.
     fn iterate(
         &mut self,
-        factors: &[&SystemFactor],
+        factors: &FactorCache,
         partners: &[Partner],
         h: f64,
         limits: &ContactLimits,
@@ -108,10 +101,11 @@ impl Island {
         let mut outcome;
         loop {
             outcome = Outcome::Descended;
-            for (k, body) in self.bodies.iter_mut().enumerate() {
+            for (body, lbfgs) in self.bodies.iter_mut().zip(&mut self.accelerations) {
+                let factor = factors.get(body.factor);
                 match acceleration_of(body, &self.contacts) {
-                    Acceleration::Lbfgs { window } => self.accelerations[k].step(window, body, factors[k]),
-                    Acceleration::None => body.free_step(factors[k]),
+                    Acceleration::Lbfgs { window } => lbfgs.step(window, body, factor),
+                    Acceleration::None => body.free_step(factor),
                 }
             }
             if !self.contacts.is_empty() {
@@ -169,7 +163,7 @@ impl Island {
 
     fn solve_contacts(
         &mut self,
-        factors: &[&SystemFactor],
+        factors: &FactorCache,
         partners: &[Partner],
         h: f64,
         limits: &ContactLimits,
@@ -185,8 +179,8 @@ impl Island {
         self.report.cone_factorizations += work.factorizations;
         self.report.cone_failures += work.failures;
         if changed {
-            for (body, factor) in self.bodies.iter_mut().zip(factors) {
-                body.contact_step(factor);
+            for body in &mut self.bodies {
+                body.contact_step(factors.get(body.factor));
             }
         }
     }

@@ -10,9 +10,15 @@ use std::collections::VecDeque;
 #[derive(Default)]
 pub(crate) struct Lbfgs {
     pairs: VecDeque<Pair>,
+    /// Memory of pairs that were forgotten.
+    spare: Vec<Pair>,
     window: usize,
+    force: Vec<Vec3>,
+    step: Vec<Vec3>,
+    along: Vec<f64>,
 }
 
+#[derive(Default)]
 struct Pair {
     /// Change of position \[m\].
     moved: Vec<Vec3>,
@@ -27,43 +33,53 @@ impl Lbfgs {
     }
 
     pub fn clear(&mut self) {
-        self.pairs.clear();
+        self.spare.extend(self.pairs.drain(..));
     }
 
     /// Adds the quasi-Newton step to the trial of `body`.
     pub fn step(&mut self, window: usize, body: &mut BodyProblem, factor: &SystemFactor) {
         self.window = window;
-        let mut q = body.free_residual();
-        let mut along = Vec::with_capacity(self.pairs.len());
-        for pair in self.pairs.iter().rev() {
-            let a = pair.inverse_curvature * dot(&pair.moved, &q);
-            add(&mut q, &pair.force, -a);
+        let Self { pairs, force: q, step, along, .. } = self;
+        body.free_residual(q);
+        along.clear();
+        for pair in pairs.iter().rev() {
+            let a = pair.inverse_curvature * dot(&pair.moved, q);
+            add(q, &pair.force, -a);
             along.push(a);
         }
-        let mut step = body.preconditioned(&q, factor);
-        for (pair, a) in self.pairs.iter().zip(along.iter().rev()) {
-            let b = pair.inverse_curvature * dot(&pair.force, &step);
-            add(&mut step, &pair.moved, a - b);
+        step.resize(q.len(), Vec3::zeros());
+        body.metric.apply(factor, q, step);
+        for (pair, a) in pairs.iter().zip(along.iter().rev()) {
+            let b = pair.inverse_curvature * dot(&pair.force, step);
+            add(step, &pair.moved, a - b);
         }
-        body.set_trial(&step);
+        body.set_trial(step);
     }
 
     /// Takes in the step from the current iterate to the trial.
     pub fn learn(&mut self, body: &BodyProblem) {
-        let difference =
-            |a: &[Vec3], b: &[Vec3]| -> Vec<Vec3> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
-        let moved = difference(&body.trial.x, &body.current.x);
-        let mut force = difference(&body.current.r, &body.trial.r);
-        body.key.pins.iter().for_each(|&p| force[p as usize] = Vec3::zeros());
-        let curvature = dot(&moved, &force);
+        let mut pair = self.spare.pop().unwrap_or_default();
+        difference(&body.trial.x, &body.current.x, &mut pair.moved);
+        difference(&body.current.r, &body.trial.r, &mut pair.force);
+        body.key.pins.iter().for_each(|&p| pair.force[p as usize] = Vec3::zeros());
+        let (moved, force) = (&pair.moved, &pair.force);
+        let curvature = dot(moved, force);
         // Pairs of no or negative curvature would make the update indefinite.
-        if curvature > 1e-12 * dot(&moved, &moved).sqrt() * dot(&force, &force).sqrt() {
+        if curvature > 1e-12 * dot(moved, moved).sqrt() * dot(force, force).sqrt() {
+            pair.inverse_curvature = 1.0 / curvature;
             if self.pairs.len() == self.window {
-                self.pairs.pop_front();
+                self.spare.extend(self.pairs.pop_front());
             }
-            self.pairs.push_back(Pair { moved, force, inverse_curvature: 1.0 / curvature });
+            self.pairs.push_back(pair);
+        } else {
+            self.spare.push(pair);
         }
     }
+}
+
+fn difference(a: &[Vec3], b: &[Vec3], out: &mut Vec<Vec3>) {
+    out.clear();
+    out.extend(a.iter().zip(b).map(|(a, b)| a - b));
 }
 
 fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {

@@ -9,7 +9,6 @@
 
 use super::factor::FactorScratch;
 use super::factor_cache::SystemFactor;
-use super::system::FactorKey;
 use crate::body::elastic::add_node_rotations;
 use crate::body::{DeformableModel, SystemMatrix};
 use crate::math::lanes::{LANES, LaneMat3};
@@ -24,6 +23,7 @@ pub(crate) struct Metric {
     per_node: Vec<Mat3>,
     deflation: Deflation,
     rhs: Vec<f64>,
+    balanced: Vec<Vec3>,
     scratch: FactorScratch,
 }
 
@@ -44,12 +44,14 @@ struct Deflation {
     coupling: Vec<Mat3>,
     /// `Σ_i m_i G_i`.
     mean: Mat3,
-    /// What they were made from.
-    made_from: Option<(FactorKey, Vec<Mat3>)>,
+    /// What they were made from: a factor's serial and frames.
+    made_from: (Option<u64>, Vec<Mat3>),
     masses: Vec<f64>,
     total_mass: f64,
     /// h²/(1 + αh) [s²].
     mobility: f64,
+    push: Vec<Vec3>,
+    column: Vec<Vec3>,
 }
 
 impl Metric {
@@ -79,7 +81,7 @@ impl Metric {
         differs
     }
 
-    /// One frame per node, of the elements at `x`; `free` bodies (without pins) get their
+    /// One frame per node, of the elements at `x`; free bodies (without pins) get their
     /// translation mode back.
     pub fn set_per_node(
         &mut self,
@@ -87,7 +89,7 @@ impl Metric {
         x: &[Vec3],
         masses: &[f64],
         mobility: f64,
-        key: &FactorKey,
+        is_free: bool,
         factor: &SystemFactor,
     ) {
         self.kind = FrameKind::PerNode;
@@ -104,38 +106,38 @@ impl Metric {
             let rotations = polar_rotations(&block);
             chunk.iter_mut().enumerate().for_each(|(i, q)| *q = rounded(&rotations.lane(i)));
         }
-        self.deflation.active = key.pins.is_empty();
-        if self.deflation.active {
-            self.refresh_deflation(masses, mobility, key, factor);
+        self.deflation.active = is_free;
+        if is_free {
+            self.refresh_deflation(masses, mobility, factor);
         }
     }
 
-    fn refresh_deflation(&mut self, masses: &[f64], mobility: f64, key: &FactorKey, factor: &SystemFactor) {
-        let same = |(k, frames): &(FactorKey, Vec<Mat3>)| k == key && *frames == self.per_node;
-        if self.deflation.made_from.as_ref().is_some_and(same) {
+    fn refresh_deflation(&mut self, masses: &[f64], mobility: f64, factor: &SystemFactor) {
+        let (serial, frames) = &self.deflation.made_from;
+        if *serial == Some(factor.serial) && *frames == self.per_node {
             return;
         }
-        let mut coupling = std::mem::take(&mut self.deflation.coupling);
-        coupling.clear();
-        coupling.resize(masses.len(), Mat3::zeros());
-        let mut column = vec![Vec3::zeros(); masses.len()];
+        let mut d = std::mem::take(&mut self.deflation);
+        d.coupling.clear();
+        d.coupling.resize(masses.len(), Mat3::zeros());
+        d.column.resize(masses.len(), Vec3::zeros());
         for c in 0..3 {
-            let push: Vec<Vec3> = masses.iter().map(|m| Vec3::ith(c, *m)).collect();
-            self.rotate_and_solve(factor, &push, &mut column);
-            for (g, v) in coupling.iter_mut().zip(&column) {
+            d.push.clear();
+            d.push.extend(masses.iter().map(|m| Vec3::ith(c, *m)));
+            self.rotate_and_solve(factor, &d.push, &mut d.column);
+            for (g, v) in d.coupling.iter_mut().zip(&d.column) {
                 g.set_column(c, v);
             }
         }
-        let mean = coupling.iter().zip(masses).fold(Mat3::zeros(), |sum, (g, m)| sum + g * *m);
-        self.deflation = Deflation {
-            active: true,
-            coupling,
-            mean: (mean + mean.transpose()) * 0.5,
-            made_from: Some((key.clone(), self.per_node.clone())),
-            masses: masses.to_vec(),
-            total_mass: masses.iter().sum(),
-            mobility,
-        };
+        let mean = d.coupling.iter().zip(masses).fold(Mat3::zeros(), |sum, (g, m)| sum + g * *m);
+        d.mean = (mean + mean.transpose()) * 0.5;
+        d.made_from.0 = Some(factor.serial);
+        d.made_from.1.clone_from(&self.per_node);
+        d.masses.clear();
+        d.masses.extend_from_slice(masses);
+        d.total_mass = masses.iter().sum();
+        d.mobility = mobility;
+        self.deflation = d;
     }
 
     /// `out = P r`: displacements \[m\] of forces \[N\].
@@ -147,8 +149,11 @@ impl Metric {
         let sum: Vec3 = r.iter().sum();
         let d = std::mem::take(&mut self.deflation);
         let acceleration = sum / d.total_mass;
-        let balanced: Vec<Vec3> = r.iter().zip(&d.masses).map(|(r, m)| r - acceleration * *m).collect();
+        let mut balanced = std::mem::take(&mut self.balanced);
+        balanced.clear();
+        balanced.extend(r.iter().zip(&d.masses).map(|(r, m)| r - acceleration * *m));
         self.rotate_and_solve(factor, &balanced, out);
+        self.balanced = balanced;
         let drift = out.iter().zip(&d.masses).fold(Vec3::zeros(), |a, (o, m)| a + o * *m) / d.total_mass;
         let shift = acceleration * d.mobility - drift;
         out.iter_mut().for_each(|o| *o += shift);

@@ -21,7 +21,7 @@ mod triangular;
 
 pub(crate) use body_problem::BodyProblem;
 pub(crate) use contact_system::ContactLimits;
-pub(crate) use factor_cache::FactorCache;
+pub(crate) use factor_cache::{FactorCache, FactorId};
 pub(crate) use island::{Island, ROUNDING};
 pub(crate) use partner::{Partner, Reaction};
 pub(crate) use system::FactorKey;

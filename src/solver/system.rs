@@ -26,16 +26,29 @@ pub(crate) struct FactorKey {
 
 impl FactorKey {
     pub fn new(body: &DeformableBody, h: f64) -> Self {
+        let mut key = Self {
+            model: body.model.id,
+            system: SystemMatrix::default(),
+            precision: FactorPrecision::default(),
+            elasticity: body.material.elasticity,
+            bits: [0; 6],
+            pins: Vec::new(),
+        };
+        key.update(body, h);
+        key
+    }
+
+    /// The key of a body at a step of `h` \[s\], in the memory of another.
+    pub fn update(&mut self, body: &DeformableBody, h: f64) {
         let m = &body.material;
         let [e, nu, rho] = [m.youngs_modulus, m.poisson_ratio, m.density];
-        Self {
-            model: body.model.id,
-            system: body.settings().system,
-            precision: body.settings().precision,
-            elasticity: m.elasticity,
-            bits: [h, e, nu, rho, m.mass_damping, m.stiffness_damping].map(f64::to_bits),
-            pins: body.pins.iter().map(|p| p.node).collect(),
-        }
+        self.model = body.model.id;
+        self.system = body.settings().system;
+        self.precision = body.settings().precision;
+        self.elasticity = m.elasticity;
+        self.bits = [h, e, nu, rho, m.mass_damping, m.stiffness_damping].map(f64::to_bits);
+        self.pins.clear();
+        self.pins.extend(body.pins.iter().map(|p| p.node));
     }
 }
 
