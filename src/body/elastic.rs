@@ -9,9 +9,9 @@
 use super::model::{DeformableModel, ElementBlock};
 use crate::energy::{ElementEnergy, with_energy};
 use crate::material::{DeformableMaterial, Lame};
-use crate::math::lanes::{LANES, Lane, LaneMat3};
+use crate::math::lanes::{LANES, Lane, LaneMat3, dot3};
 use crate::math::polar::{polar_rotation, polar_rotations};
-use crate::math::{Mat3, Vec3};
+use crate::math::{Mat3, Vec3, vectorized};
 
 /// Stiffness damping over one step.
 #[derive(Clone, Debug, Default)]
@@ -28,15 +28,24 @@ impl StiffnessDamping {
         self.ratio = beta / h;
         self.stretches.clear();
         if beta > 0.0 {
-            self.stretches.extend(model.blocks.iter().map(|block| {
-                let F = deformation_gradient(block, x);
-                let S = transpose_mul(&polar_rotations(&F), &F);
-                // Symmetric but for roundings.
-                LaneMat3(std::array::from_fn(|k| (S.0[k] + S.at(k / 3, k % 3)) * 0.5))
-            }));
+            push_stretches(model, x, &mut self.stretches);
         }
     }
 }
+
+vectorized! {
+fn push_stretches[](model: &DeformableModel, x: &[Vec3], stretches: &mut Vec<LaneMat3>) {
+    for block in &model.blocks {
+        let F = deformation_gradient(block, x);
+        let S = transpose_mul(&polar_rotations(&F), &F);
+        // Symmetric but for roundings.
+        stretches.push(LaneMat3(std::array::from_fn(|k| (S.0[k] + S.at(k / 3, k % 3)) * 0.5)));
+    }
+}
+}
+
+/// Blocks that go through the stages of the element loop together.
+const STAGE: usize = 16;
 
 /// What an evaluation tells besides the forces.
 #[derive(Clone, Copy, Debug)]
@@ -58,32 +67,13 @@ pub(crate) fn add_forces(
     force: &mut [Vec3],
 ) -> Elastic {
     with_energy!(material, energy => {
-        #[cfg(target_arch = "x86_64")]
-        if std::is_x86_feature_detected!("avx2") {
-            // SAFETY: the feature was just detected. No fused operations: the same bits as below.
-            return unsafe { sum_elements_avx2(energy, model, material, damping, x, frame, force) };
-        }
         sum_elements(energy, model, material, damping, x, frame, force)
     })
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn sum_elements_avx2(
-    energy: impl ElementEnergy,
-    model: &DeformableModel,
-    material: &DeformableMaterial,
-    damping: &StiffnessDamping,
-    x: &[Vec3],
-    frame: &Mat3,
-    force: &mut [Vec3],
-) -> Elastic {
-    sum_elements(energy, model, material, damping, x, frame, force)
-}
-
-#[inline(always)]
-fn sum_elements(
-    energy: impl ElementEnergy,
+vectorized! {
+fn sum_elements[E: ElementEnergy](
+    energy: E,
     model: &DeformableModel,
     material: &DeformableMaterial,
     damping: &StiffnessDamping,
@@ -94,26 +84,37 @@ fn sum_elements(
     let lame = material.lame();
     let mut total = Lane::default();
     let mut least_trace = Lane::splat(3.0);
-    for (k, block) in model.blocks.iter().enumerate() {
-        let F = deformation_gradient(block, x);
-        let mut response = energy.evaluate(&F);
-        if let Some(stretch) = damping.stretches.get(k) {
-            let (density, stress) = damping_response(lame, stretch, &F, &response.rotation);
-            response.density += density * damping.ratio;
-            response.stress = response.stress.plus_scaled(&stress, Lane::splat(damping.ratio));
+    // In stages over a few blocks: each loop is short enough for the next block to start in it while
+    // the last one waits for its divisions.
+    let mut buffer = [LaneMat3::default(); STAGE];
+    for (stage, blocks) in model.blocks.chunks(STAGE).enumerate() {
+        for (F, block) in buffer.iter_mut().zip(blocks) {
+            *F = deformation_gradient(block, x);
         }
-        total += response.density * block.volumes;
-        scatter_forces(block, &response.stress, force);
-        let mut trace = Lane::default();
-        for c in 0..3 {
-            for r in 0..3 {
-                trace += response.rotation.at(r, c) * frame[(r, c)];
+        for (k, (F, block)) in buffer.iter_mut().zip(blocks).enumerate() {
+            let mut response = energy.evaluate(F);
+            if let Some(stretch) = damping.stretches.get(stage * STAGE + k) {
+                let (density, stress) = damping_response(lame, stretch, F, &response.rotation);
+                response.density += density * damping.ratio;
+                response.stress = response.stress.plus_scaled(&stress, Lane::splat(damping.ratio));
             }
+            total += response.density * block.volumes;
+            let mut trace = Lane::default();
+            for c in 0..3 {
+                for r in 0..3 {
+                    trace = response.rotation.at(r, c).mul_add(Lane::splat(frame[(r, c)]), trace);
+                }
+            }
+            least_trace = least_trace.zip(trace, f64::min);
+            *F = response.stress;
         }
-        least_trace = least_trace.zip(trace, f64::min);
+        for (stress, block) in buffer.iter().zip(blocks) {
+            scatter_forces(block, stress, force);
+        }
     }
     let least_trace = least_trace.0.into_iter().fold(3.0, f64::min);
     Elastic { energy: total.sum(), least_trace }
+}
 }
 
 /// Damping's energy density and stress, both per β/h.
@@ -148,9 +149,8 @@ fn deformation_gradient(block: &ElementBlock, x: &[Vec3]) -> LaneMat3 {
     for r in 0..3 {
         let edges = [1, 2, 3].map(|a| corners[a][r] - corners[0][r]);
         for c in 0..3 {
-            F.0[3 * c + r] = edges[0] * block.gradients[0][c]
-                + edges[1] * block.gradients[1][c]
-                + edges[2] * block.gradients[2][c];
+            let gradients = [block.gradients[0][c], block.gradients[1][c], block.gradients[2][c]];
+            F.0[3 * c + r] = dot3(edges, gradients);
         }
     }
     F
@@ -162,9 +162,7 @@ fn scatter_forces(block: &ElementBlock, stress: &LaneMat3, force: &mut [Vec3]) {
     let mut corner_forces = [[Lane::default(); 3]; 4];
     for r in 0..3 {
         for a in 0..3 {
-            let f = P.at(r, 0) * block.gradients[a][0]
-                + P.at(r, 1) * block.gradients[a][1]
-                + P.at(r, 2) * block.gradients[a][2];
+            let f = dot3([P.at(r, 0), P.at(r, 1), P.at(r, 2)], block.gradients[a]);
             corner_forces[a + 1][r] = -f;
             corner_forces[0][r] += f;
         }
@@ -184,39 +182,37 @@ fn transpose_mul(a: &LaneMat3, b: &LaneMat3) -> LaneMat3 {
     let mut out = LaneMat3::default();
     for c in 0..3 {
         for r in 0..3 {
-            out.0[3 * c + r] = a.at(0, r) * b.at(0, c) + a.at(1, r) * b.at(1, c) + a.at(2, r) * b.at(2, c);
+            out.0[3 * c + r] =
+                dot3([a.at(0, r), a.at(1, r), a.at(2, r)], [b.at(0, c), b.at(1, c), b.at(2, c)]);
         }
     }
     out
 }
 
-/// Adds the volume-weighted rotations of the elements around each node to `sums`.
-pub(crate) fn add_node_rotations(model: &DeformableModel, x: &[Vec3], sums: &mut [Mat3]) {
-    #[cfg(target_arch = "x86_64")]
-    if std::is_x86_feature_detected!("avx2") {
-        // SAFETY: the feature was just detected.
-        return unsafe { sum_rotations_avx2(model, x, sums) };
-    }
-    sum_rotations(model, x, sums);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn sum_rotations_avx2(model: &DeformableModel, x: &[Vec3], sums: &mut [Mat3]) {
-    sum_rotations(model, x, sums);
-}
-
-#[inline(always)]
-fn sum_rotations(model: &DeformableModel, x: &[Vec3], sums: &mut [Mat3]) {
+vectorized! {
+/// Replaces `frames` by the mean rotations of the elements around each node, weighted by volume.
+pub(crate) fn node_rotations[](model: &DeformableModel, x: &[Vec3], frames: &mut [Mat3]) {
+    frames.fill(Mat3::zeros());
     for block in &model.blocks {
         let rotations = polar_rotations(&deformation_gradient(block, x)).scaled(block.volumes);
         for i in 0..LANES {
             let weighted = rotations.lane(i);
             for a in 0..4 {
-                sums[block.corners[a][i] as usize] += weighted;
+                frames[block.corners[a][i] as usize] += weighted;
             }
         }
     }
+    for chunk in frames.chunks_mut(LANES) {
+        // Scaled to about one, four at a time; the last chunk repeats its last.
+        let mut block = LaneMat3::default();
+        for i in 0..LANES {
+            let sum = &chunk[i.min(chunk.len() - 1)];
+            block.set_lane(i, &(sum / sum.norm().max(f64::MIN_POSITIVE)));
+        }
+        let rotations = polar_rotations(&block);
+        chunk.iter_mut().enumerate().for_each(|(i, frame)| *frame = rotations.lane(i));
+    }
+}
 }
 
 /// The rotation that carries the rest shape nearest to `x` in the mass-weighted least-squares

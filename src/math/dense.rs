@@ -1,24 +1,11 @@
 //! Products with dense matrices, column by column.
 
-/// `out = A v`, `A` stored by columns with `out.len()` rows. Every entry is the sum over the columns in
-/// their order, four at a time, whatever instructions it is compiled for.
-pub(crate) fn multiply(A: &[f64], v: &[f64], out: &mut [f64]) {
-    #[cfg(target_arch = "x86_64")]
-    if std::is_x86_feature_detected!("avx2") {
-        // SAFETY: the feature was just detected. No fused operations: the same bits as below.
-        return unsafe { multiply_avx2(A, v, out) };
-    }
-    multiply_columns(A, v, out);
-}
+use super::vectorized;
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn multiply_avx2(A: &[f64], v: &[f64], out: &mut [f64]) {
-    multiply_columns(A, v, out);
-}
-
-#[inline(always)]
-fn multiply_columns(A: &[f64], v: &[f64], out: &mut [f64]) {
+vectorized! {
+/// `out = A v`, `A` stored by columns with `out.len()` rows: every entry is the sum over the columns
+/// in their order.
+pub(crate) fn multiply[](A: &[f64], v: &[f64], out: &mut [f64]) {
     out.fill(0.0);
     let m = out.len();
     if m == 0 {
@@ -31,14 +18,15 @@ fn multiply_columns(A: &[f64], v: &[f64], out: &mut [f64]) {
         let (b, rest) = rest.split_at(m);
         let (c, d) = rest.split_at(m);
         for i in 0..m {
-            out[i] += (a[i] * w[0] + b[i] * w[1]) + (c[i] * w[2] + d[i] * w[3]);
+            out[i] = d[i].mul_add(w[3], c[i].mul_add(w[2], b[i].mul_add(w[1], a[i].mul_add(w[0], out[i]))));
         }
     }
     for (column, w) in groups.remainder().chunks_exact(m).zip(weights.remainder()) {
         for (o, a) in out.iter_mut().zip(column) {
-            *o += a * w;
+            *o = a.mul_add(*w, *o);
         }
     }
+}
 }
 
 #[cfg(test)]

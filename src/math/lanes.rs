@@ -1,7 +1,8 @@
 //! Four numbers side by side: the unit of work of the element loops.
 //!
 //! Plain arrays, so that the compiler vectorises them for whatever instruction set the caller is
-//! compiled for. No operation here is fused, so the bits do not depend on that choice.
+//! compiled for ([`vectorized!`](super::vectorized)). What is fused is fused by name (`mul_add`), so
+//! the bits do not depend on that choice.
 
 use super::Mat3;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
@@ -34,6 +35,16 @@ impl Lane {
         let mut out = self;
         for i in 0..LANES {
             out.0[i] = f(self.0[i], rhs.0[i]);
+        }
+        out
+    }
+
+    /// `self·b + c` with one rounding.
+    #[inline(always)]
+    pub fn mul_add(self, b: Self, c: Self) -> Self {
+        let mut out = self;
+        for i in 0..LANES {
+            out.0[i] = self.0[i].mul_add(b.0[i], c.0[i]);
         }
         out
     }
@@ -82,6 +93,12 @@ impl AddAssign for Lane {
     }
 }
 
+/// Scalar product.
+#[inline(always)]
+pub(crate) fn dot3(a: [Lane; 3], b: [Lane; 3]) -> Lane {
+    a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
+}
+
 /// One 3×3 matrix per element of a block, `self.0[3 * column + row]`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LaneMat3(pub [Lane; 9]);
@@ -122,7 +139,7 @@ impl LaneMat3 {
     pub fn plus_scaled(&self, other: &Self, s: Lane) -> Self {
         let mut out = *self;
         for k in 0..9 {
-            out.0[k] = self.0[k] + other.0[k] * s;
+            out.0[k] = other.0[k].mul_add(s, self.0[k]);
         }
         out
     }
@@ -141,7 +158,7 @@ impl LaneMat3 {
     pub fn dot(&self, other: &Self) -> Lane {
         let mut sum = self.0[0] * other.0[0];
         for k in 1..9 {
-            sum += self.0[k] * other.0[k];
+            sum = self.0[k].mul_add(other.0[k], sum);
         }
         sum
     }
@@ -152,9 +169,10 @@ impl LaneMat3 {
         let mut out = Self::default();
         for c in 0..3 {
             for r in 0..3 {
-                out.0[3 * c + r] = self.at(r, 0) * other.at(c, 0)
-                    + self.at(r, 1) * other.at(c, 1)
-                    + self.at(r, 2) * other.at(c, 2);
+                out.0[3 * c + r] = dot3(
+                    [self.at(r, 0), self.at(r, 1), self.at(r, 2)],
+                    [other.at(c, 0), other.at(c, 1), other.at(c, 2)],
+                );
             }
         }
         out
@@ -166,9 +184,10 @@ impl LaneMat3 {
         let mut out = Self::default();
         for c in 0..3 {
             for r in 0..3 {
-                out.0[3 * c + r] = self.at(r, 0) * other.at(0, c)
-                    + self.at(r, 1) * other.at(1, c)
-                    + self.at(r, 2) * other.at(2, c);
+                out.0[3 * c + r] = dot3(
+                    [self.at(r, 0), self.at(r, 1), self.at(r, 2)],
+                    [other.at(0, c), other.at(1, c), other.at(2, c)],
+                );
             }
         }
         out
@@ -183,7 +202,7 @@ impl LaneMat3 {
             let (c1, c2) = ((c + 1) % 3, (c + 2) % 3);
             for r in 0..3 {
                 let (r1, r2) = ((r + 1) % 3, (r + 2) % 3);
-                out.0[3 * c + r] = m(r1, c1) * m(r2, c2) - m(r1, c2) * m(r2, c1);
+                out.0[3 * c + r] = m(r1, c1).mul_add(m(r2, c2), -(m(r1, c2) * m(r2, c1)));
             }
         }
         out

@@ -3,6 +3,9 @@
 //! Everything inside the crate is `f64`; rapier's `f32` types appear only at the surface, through
 //! [`to_real`] and [`from_real`].
 
+mod vectorized;
+pub(crate) use vectorized::vectorized;
+
 pub(crate) mod dense;
 pub(crate) mod lanes;
 pub(crate) mod polar;

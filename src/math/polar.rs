@@ -3,14 +3,14 @@
 //! `det R = +1` also where `F` is inverted: then the smallest singular value counts as negative,
 //! which is what lets an inverted element find its way back.
 
-use super::lanes::{LANES, Lane, LaneMat3};
+use super::lanes::{LANES, Lane, LaneMat3, dot3};
 use super::{Mat3, Vec3};
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion};
 
 /// Newton iterations at the most; five suffice from a stretch of ten.
 const MAX_NEWTON: usize = 12;
-/// The last Newton step, squared: its successor would be its square, far below one rounding.
-const NEWTON_TOLERANCE: f64 = 1.0e-18;
+/// Stretch beyond one from which the next step is the last: it leaves half of the square of this.
+const NEWTON_TOLERANCE: f64 = 1.0e-8;
 /// Elements flatter than this (det / |F|³, a cube has 0.19) take the eigenvalue route.
 const FLAT: f64 = 1.0e-3;
 
@@ -23,9 +23,7 @@ pub(crate) fn polar_rotations(F: &LaneMat3) -> LaneMat3 {
     let mut R = *F;
     let norm2 = F.dot(F);
     let mut easy = true;
-    let cofactor = R.cofactor();
-    let det0 =
-        R.at(0, 0) * cofactor.at(0, 0) + R.at(0, 1) * cofactor.at(0, 1) + R.at(0, 2) * cofactor.at(0, 2);
+    let det0 = determinant(F, &F.cofactor());
     for i in 0..LANES {
         let n = norm2.0[i];
         easy &= det0.0[i] > FLAT * n * n.sqrt();
@@ -40,21 +38,23 @@ pub(crate) fn polar_rotations(F: &LaneMat3) -> LaneMat3 {
 }
 
 #[inline(always)]
+fn determinant(m: &LaneMat3, cofactor: &LaneMat3) -> Lane {
+    let row = |m: &LaneMat3| [m.at(0, 0), m.at(0, 1), m.at(0, 2)];
+    dot3(row(m), row(cofactor))
+}
+
+#[inline(always)]
 fn newton(R: &mut LaneMat3) -> bool {
-    for _ in 0..MAX_NEWTON {
+    for step in 0..MAX_NEWTON {
         let cofactor = R.cofactor();
-        let det =
-            R.at(0, 0) * cofactor.at(0, 0) + R.at(0, 1) * cofactor.at(0, 1) + R.at(0, 2) * cofactor.at(0, 2);
+        let det = determinant(R, &cofactor);
         let half_inv = Lane::splat(0.5) / det;
-        let mut change = Lane::default();
         for k in 0..9 {
-            let next = R.0[k] * 0.5 + cofactor.0[k] * half_inv;
-            let d = next - R.0[k];
-            change += d * d;
-            R.0[k] = next;
+            R.0[k] = cofactor.0[k].mul_add(half_inv, R.0[k] * 0.5);
         }
-        // NaN fails the comparison and ends in the scalar route.
-        if change.0.iter().all(|&c| c < NEWTON_TOLERANCE) {
+        // From the first step on no singular value is below one, so the determinant tells how far
+        // the largest was above. NaN fails the comparison and ends in the scalar route.
+        if step > 0 && det.0.iter().all(|&d| d - 1.0 < NEWTON_TOLERANCE) {
             return true;
         }
     }

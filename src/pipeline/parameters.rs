@@ -1,6 +1,6 @@
 //! World-wide parameters and the counters of a step.
 
-use crate::solver::ContactLimits;
+use crate::solver::{ContactLimits, IslandReport};
 use std::time::Duration;
 
 /// Parameters of all bodies of a world. The defaults suit scenes in metres and kilograms.
@@ -61,6 +61,12 @@ pub struct DeformableCounters {
     pub not_converged: usize,
     /// Times the guard had an iteration done again.
     pub guard_retries: usize,
+    /// Elements whose energy and forces were computed, each time counted.
+    pub elements: usize,
+    /// Solves with the constant matrix.
+    pub solves: usize,
+    /// Bytes of factors that those solves read: every number twice.
+    pub solve_bytes: usize,
     /// Newton steps of the contact problems.
     pub newton_steps: usize,
     /// Dense factorizations of the contact problems.
@@ -85,11 +91,30 @@ pub struct DeformableCounters {
     pub factor_time: Duration,
     /// Prediction, global iterations and contact problems.
     pub solve_time: Duration,
+    /// Of the solve, computing elements; summed over threads, as the next two.
+    pub element_time: Duration,
+    /// Of the solve, solving with the constant matrix.
+    pub linear_time: Duration,
+    /// Of the solve, assembling and solving contact problems.
+    pub contact_time: Duration,
     /// Storing states and handing over reactions.
     pub advance_time: Duration,
 }
 
 impl DeformableCounters {
+    pub(super) fn add(&mut self, report: &IslandReport) {
+        self.iterations += report.iterations;
+        self.newton_steps += report.newton_steps;
+        self.contact_factorizations += report.cone_factorizations;
+        self.contact_failures += report.cone_failures;
+        self.elements += report.effort.elements;
+        self.solves += report.effort.solves;
+        self.solve_bytes += report.effort.solve_bytes;
+        self.element_time += report.effort.element_time;
+        self.linear_time += report.effort.linear_time;
+        self.contact_time += report.effort.contact_time;
+    }
+
     /// Time of the whole step without rapier's own.
     pub fn total_time(&self) -> Duration {
         self.detection_time + self.factor_time + self.solve_time + self.advance_time

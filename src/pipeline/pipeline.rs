@@ -184,10 +184,7 @@ impl DeformablePipeline {
         let (factors, partners) = (&self.factors, &self.scene.partners);
         for_each(&mut self.islands, |work| work.island.solve(factors, partners, h, &limits));
         for report in self.islands.iter().map(|work| work.island.report) {
-            self.counters.iterations += report.iterations;
-            self.counters.newton_steps += report.newton_steps;
-            self.counters.contact_factorizations += report.cone_factorizations;
-            self.counters.contact_failures += report.cone_failures;
+            self.counters.add(&report);
         }
     }
 

@@ -4,6 +4,7 @@
 //! `s = x_n + h v_n + h² M⁻¹ f_ext` [Bouaziz et al. 2014], E the elastic energy with the stiffness
 //! damping of the step. The residual is `r = −∂Ψ/∂x` \[N\]; pinned nodes are not unknowns.
 
+use super::effort::{Effort, timed};
 use super::factor_cache::{FactorId, SystemFactor};
 use super::metric::Metric;
 use super::system::FactorKey;
@@ -114,6 +115,7 @@ impl BodyProblem {
         self.h = h;
         self.scaling = 1.0;
         self.guard_retries = 0;
+        self.metric.effort = Effort::default();
         self.x_start.clone_from(&body.state.x);
         self.v_start.clone_from(&body.state.v);
         self.masses.clear();
@@ -313,11 +315,13 @@ impl BodyProblem {
         self.trial = iterate;
     }
 
-    fn evaluate(&self, at: &mut Iterate) {
+    fn evaluate(&mut self, at: &mut Iterate) {
         at.r.clear();
         at.r.resize(at.x.len(), Vec3::zeros());
         let (model, material, damping) = (&self.model, &self.material, &self.damping);
-        let elastic = elastic::add_forces(model, material, damping, &at.x, &self.frame, &mut at.r);
+        let time = &mut self.metric.effort.element_time;
+        let elastic =
+            timed(time, || elastic::add_forces(model, material, damping, &at.x, &self.frame, &mut at.r));
         at.least_trace = elastic.least_trace;
         at.internal = at.r.iter().map(|f| f.amax()).fold(0.0, f64::max);
         let (inertia, drag) = (1.0 / (self.h * self.h), self.material.mass_damping / self.h);
@@ -329,6 +333,7 @@ impl BodyProblem {
             kinetic += m * (inertia * from_target.norm_squared() + drag * moved.norm_squared());
         }
         at.objective = elastic.energy + 0.5 * kinetic;
+        self.metric.effort.elements += self.model.tetrahedra.len();
     }
 
     /// The guard [cf. Nocedal & Wright 2006, sufficient decrease]:

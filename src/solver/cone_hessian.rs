@@ -4,6 +4,7 @@
 use super::cone_newton::ConeProblem;
 use super::factor::DenseFactor;
 use crate::contact::cone;
+use crate::math::vectorized;
 
 /// Curvatures of all contacts and the factor they lead to.
 #[derive(Default)]
@@ -92,18 +93,7 @@ impl ConeHessian {
     }
 
     fn assemble(&mut self, problem: &ConeProblem) {
-        #[cfg(target_arch = "x86_64")]
-        if std::is_x86_feature_detected!("avx2") {
-            // SAFETY: the feature was just detected. No fused operations: the same bits as below.
-            return unsafe { self.assemble_avx2(problem) };
-        }
-        self.assemble_columns(problem);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn assemble_avx2(&mut self, problem: &ConeProblem) {
-        self.assemble_columns(problem);
+        assemble(self, problem);
     }
 
     /// The lower triangle, column by column: first the product of W with a column of L, then that of
@@ -151,6 +141,12 @@ impl ConeHessian {
         self.factor.put_matrix(matrix, size);
         self.product = product;
     }
+}
+
+vectorized! {
+fn assemble[](hessian: &mut ConeHessian, problem: &ConeProblem) {
+    hessian.assemble_columns(problem);
+}
 }
 
 pub(crate) fn spatial(rows: &[f64]) -> [f64; 3] {

@@ -9,6 +9,7 @@
 use super::body_problem::BodyProblem;
 use super::cone_newton::ConeTolerance;
 use super::contact_system::{ContactLimits, ContactSystem};
+use super::effort::{Effort, timed};
 use super::factor_cache::FactorCache;
 use super::lbfgs::Lbfgs;
 use super::partner::Partner;
@@ -30,6 +31,7 @@ pub(crate) struct IslandReport {
     pub newton_steps: usize,
     pub cone_factorizations: usize,
     pub cone_failures: usize,
+    pub effort: Effort,
 }
 
 /// What became of an iteration.
@@ -57,7 +59,7 @@ impl Island {
         }
         if !self.contacts.is_empty() {
             self.contacts.begin(&mut self.bodies, partners, h, limits);
-            self.contacts.assemble(&self.bodies, factors, partners, h);
+            self.assemble_contacts(factors, partners, h);
             self.contacts.expect();
         }
         self.accelerations.resize_with(self.bodies.len(), Lbfgs::default);
@@ -80,13 +82,14 @@ impl Island {
             if !self.contacts.is_empty() {
                 let turned = self.bodies.iter_mut().filter_map(|b| b.refresh_frame().then_some(()));
                 if turned.count() > 0 {
-                    self.contacts.assemble(&self.bodies, factors, partners, h);
+                    self.assemble_contacts(factors, partners, h);
                 }
             }
         }
         if self.contacts.is_empty() {
             self.bodies.iter_mut().filter(|b| b.key.pins.is_empty()).for_each(BodyProblem::balance);
         }
+        self.bodies.iter().for_each(|b| self.report.effort.add(&b.metric.effort));
     }
 
     /// One iteration.
@@ -149,7 +152,7 @@ impl Island {
                 break;
             }
             if rescaled && !self.contacts.is_empty() {
-                self.contacts.assemble(&self.bodies, factors, partners, h);
+                self.assemble_contacts(factors, partners, h);
             }
         }
         for (body, acceleration) in self.bodies.iter_mut().zip(&mut self.accelerations) {
@@ -159,6 +162,12 @@ impl Island {
             body.accept_trial();
         }
         outcome
+    }
+
+    fn assemble_contacts(&mut self, factors: &FactorCache, partners: &[Partner], h: f64) {
+        let (contacts, bodies) = (&mut self.contacts, &self.bodies);
+        let time = &mut self.report.effort.contact_time;
+        timed(time, || contacts.assemble(bodies, factors, partners, h));
     }
 
     fn solve_contacts(
@@ -174,7 +183,9 @@ impl Island {
             // Without gravity or forces any positive number serves as the scale of nothing.
             floor: (1e-3 * heaviest).max(1e-12),
         };
-        let (work, changed) = self.contacts.solve(&mut self.bodies, partners, h, tolerance);
+        let (contacts, bodies) = (&mut self.contacts, &mut self.bodies);
+        let time = &mut self.report.effort.contact_time;
+        let (work, changed) = timed(time, || contacts.solve(bodies, partners, h, tolerance));
         self.report.newton_steps += work.newton_steps;
         self.report.cone_factorizations += work.factorizations;
         self.report.cone_failures += work.failures;

@@ -7,13 +7,14 @@
 //! Frames are rounded to about 10⁻⁶ rad. That costs no convergence to speak of, and at rest they
 //! are the same bits in every step, so whatever was made from them can be used again.
 
+use super::effort::Effort;
 use super::factor::FactorScratch;
 use super::factor_cache::SystemFactor;
-use crate::body::elastic::add_node_rotations;
+use super::system::dimension;
+use crate::body::elastic::node_rotations;
 use crate::body::{DeformableModel, SystemMatrix};
-use crate::math::lanes::{LANES, LaneMat3};
-use crate::math::polar::polar_rotations;
 use crate::math::{Mat3, Vec3};
+use std::time::Instant;
 
 /// Frames of one body and what follows from them.
 #[derive(Default)]
@@ -25,6 +26,8 @@ pub(crate) struct Metric {
     rhs: Vec<f64>,
     balanced: Vec<Vec3>,
     scratch: FactorScratch,
+    /// Of the solves.
+    pub effort: Effort,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -93,19 +96,9 @@ impl Metric {
         factor: &SystemFactor,
     ) {
         self.kind = FrameKind::PerNode;
-        self.per_node.clear();
         self.per_node.resize(x.len(), Mat3::zeros());
-        add_node_rotations(model, x, &mut self.per_node);
-        for chunk in self.per_node.chunks_mut(LANES) {
-            // Scaled to about one, four at a time; the last chunk repeats its last.
-            let mut block = LaneMat3::default();
-            for i in 0..LANES {
-                let sum = &chunk[i.min(chunk.len() - 1)];
-                block.set_lane(i, &(sum / sum.norm().max(f64::MIN_POSITIVE)));
-            }
-            let rotations = polar_rotations(&block);
-            chunk.iter_mut().enumerate().for_each(|(i, q)| *q = rounded(&rotations.lane(i)));
-        }
+        node_rotations(model, x, &mut self.per_node);
+        self.per_node.iter_mut().for_each(|q| *q = rounded(q));
         self.deflation.active = is_free;
         if is_free {
             self.refresh_deflation(masses, mobility, factor);
@@ -162,6 +155,7 @@ impl Metric {
 
     /// `out = Q A⁻¹ Qᵀ r`.
     fn rotate_and_solve(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
+        let start = Instant::now();
         let n = r.len();
         self.rhs.resize(3 * n, 0.0);
         match factor.system {
@@ -187,6 +181,10 @@ impl Metric {
                 }
             }
         }
+        let right_hand_sides = 3 / dimension(factor.system);
+        self.effort.solves += 1;
+        self.effort.solve_bytes += 2 * right_hand_sides * factor.factor.bytes();
+        self.effort.linear_time += start.elapsed();
     }
 
     /// The frame of a node.

@@ -4,6 +4,8 @@
 //! of the rows below it. One solve reads every number of `L` twice and does little else, so what
 //! counts is to read them in order, once per direction, and several columns at a time.
 
+use crate::math::vectorized;
+
 /// Where the supernodes of a factor are.
 #[derive(Debug, Default)]
 pub(crate) struct Supernodes {
@@ -26,31 +28,9 @@ impl Entry for f64 {}
 const GROUP: usize = 4;
 
 impl Supernodes {
-    /// Solves `L Lᵀ x = b` in place; `gathered` is memory for the longest column.
-    pub fn solve<T: Entry>(&self, values: &[T], x: &mut [f64], gathered: &mut Vec<f64>) {
-        #[cfg(target_arch = "x86_64")]
-        if std::is_x86_feature_detected!("avx2") {
-            // SAFETY: the feature was just detected. No fused operations: the same bits as below.
-            return unsafe { self.solve_avx2(values, x, gathered) };
-        }
-        self.solve_with(values, x, gathered);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn solve_avx2<T: Entry>(&self, values: &[T], x: &mut [f64], gathered: &mut Vec<f64>) {
-        self.solve_with(values, x, gathered);
-    }
-
-    #[inline(always)]
-    fn solve_with<T: Entry>(&self, values: &[T], x: &mut [f64], gathered: &mut Vec<f64>) {
-        let count = self.begin.len() - 1;
-        for s in 0..count {
-            self.forward(s, values, x, gathered);
-        }
-        for s in (0..count).rev() {
-            self.backward(s, values, x, gathered);
-        }
+    /// Solves `L Lᵀ x = b` in place; `work` is memory for the longest column.
+    pub fn solve<T: Entry>(&self, values: &[T], x: &mut [f64], work: &mut Vec<f64>) {
+        solve(self, values, x, work);
     }
 
     /// Columns, rows below, and values of a supernode.
@@ -89,7 +69,9 @@ impl Supernodes {
             let [a, b, c, d] = [0, 1, 2, 3].map(|k| &column(j + k)[j + GROUP..]);
             let w = [w[0], w[1], w[2], w[3]];
             for (i, g) in below.iter_mut().enumerate() {
-                *g -= (a[i].into() * w[0] + b[i].into() * w[1]) + (c[i].into() * w[2] + d[i].into() * w[3]);
+                let left = b[i].into().mul_add(w[1], a[i].into() * w[0]);
+                let right = d[i].into().mul_add(w[3], c[i].into() * w[2]);
+                *g -= left + right;
             }
             j += GROUP;
         }
@@ -97,7 +79,7 @@ impl Supernodes {
             let (head, below) = work.split_at_mut(j + 1);
             head[j] /= column(j)[j].into();
             for (g, l) in below.iter_mut().zip(&column(j)[j + 1..]) {
-                *g -= (*l).into() * head[j];
+                *g = (*l).into().mul_add(-head[j], *g);
             }
         }
         x[columns].copy_from_slice(&work[..n]);
@@ -133,6 +115,18 @@ impl Supernodes {
     }
 }
 
+vectorized! {
+fn solve[T: Entry](nodes: &Supernodes, values: &[T], x: &mut [f64], work: &mut Vec<f64>) {
+    let count = nodes.begin.len() - 1;
+    for s in 0..count {
+        nodes.forward(s, values, x, work);
+    }
+    for s in (0..count).rev() {
+        nodes.backward(s, values, x, work);
+    }
+}
+}
+
 /// Scalar products of some columns with one vector, each as four interleaved sums.
 #[inline(always)]
 fn dots<T: Entry, const N: usize>(columns: [&[T]; N], v: &[f64]) -> [f64; N] {
@@ -144,7 +138,7 @@ fn dots<T: Entry, const N: usize>(columns: [&[T]; N], v: &[f64]) -> [f64; N] {
         for k in 0..N {
             let c = &columns[k][i..i + LANES];
             for l in 0..LANES {
-                sums[k][l] += c[l].into() * w[l];
+                sums[k][l] = c[l].into().mul_add(w[l], sums[k][l]);
             }
         }
     }

@@ -1,0 +1,137 @@
+//! How far foible3d is from what the machine allows: `cargo bench --bench limits`.
+//!
+//! Time per element beside the number of elements, bytes per second of the solves beside those of a
+//! memory copy, memory per body, and what many equal bodies cost on one and on all threads.
+
+use foible3d::prelude::*;
+use rapier3d::prelude::*;
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+fn median(mut of: Vec<f64>) -> f64 {
+    of.sort_by(f64::total_cmp);
+    of[of.len() / 2]
+}
+
+fn in_pool<T: Send>(threads: usize, f: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool").install(f)
+}
+
+/// Gigabytes per second that a copy of `bytes` reads; what it writes is not counted, as solves hardly
+/// write. Best of some, as the machine is shared.
+fn copy_speed(bytes: usize) -> f64 {
+    let from = vec![1u8; bytes];
+    let mut to = vec![0u8; bytes];
+    let rounds = (400_000_000 / bytes).max(5);
+    let mut best = f64::INFINITY;
+    for _ in 0..rounds {
+        let start = Instant::now();
+        to.copy_from_slice(black_box(&from));
+        black_box(&mut to);
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    bytes as f64 / best * 1e-9
+}
+
+/// A hanging beam: what its elements and its solves take.
+fn beam(cells: [usize; 3], precision: FactorPrecision) {
+    let mut physics = PhysicsWorld::new();
+    let mut world = DeformableWorld::new();
+    let settings = SolverSettings { precision, ..SolverSettings::default() };
+    let builder = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.1, 0.1), cells)
+        .material(DeformableMaterial::new(1e6, 0.3).mass_damping(5.0))
+        .settings(settings)
+        .pinned(|x| x.x < -0.4999);
+    world.insert(builder).expect("a valid beam");
+    let (mut elements, mut solves) = (Vec::new(), Vec::new());
+    let per = |time: Duration, count: usize| time.as_secs_f64() / count as f64;
+    for _ in 0..200 {
+        world.step(&mut physics);
+        let c = world.counters();
+        elements.push(per(c.element_time, c.elements) * 1e9);
+        solves.push(1e-9 / per(c.linear_time, c.solve_bytes));
+    }
+    let tets = 5 * cells.iter().product::<usize>();
+    let bytes = world.counters().factor_bytes;
+    println!(
+        "{tets:>6} tets, {precision:?}: {:>5.1} ns per element; factor {:>6.2} MB, solves read {:>5.1} GB/s, a copy {:>5.1} GB/s",
+        median(elements),
+        bytes as f64 * 1e-6,
+        median(solves),
+        copy_speed(bytes)
+    );
+}
+
+/// Milliseconds per step of `count` cubes landing on a floor, one beside the other.
+fn landing(count: usize, threads: usize) -> f64 {
+    in_pool(threads, || {
+        let mut physics = PhysicsWorld::new();
+        let floor = RigidBodyBuilder::fixed().translation(Vector::Y * -0.5);
+        physics.insert(floor, ColliderBuilder::cuboid(100.0, 0.5, 100.0).friction(0.5));
+        let mut world = DeformableWorld::new();
+        let mesh = TetMesh::cuboid([0.2, 0.25, 0.2], [4, 6, 4]).expect("a valid lattice");
+        for k in 0..count {
+            let builder = DeformableBodyBuilder::mesh(&mesh)
+                .translation(Vector::new((k % 8) as f32, 0.5, (k / 8) as f32))
+                .rotation(Vector::new(0.1, 0.2, 0.3))
+                .material(DeformableMaterial::new(1e6, 0.3));
+            world.insert(builder).expect("a valid cube");
+        }
+        world.prepare(&physics).expect("a valid step");
+        let steps = 120;
+        let mut times = Vec::new();
+        for _ in 0..steps {
+            world.step(&mut physics);
+            times.push(world.counters().total_time().as_secs_f64() * 1e3);
+        }
+        times.iter().sum::<f64>() / f64::from(steps)
+    })
+}
+
+fn memory(tets: usize, cells: usize) {
+    let mut physics = PhysicsWorld::new();
+    let mut world = DeformableWorld::new();
+    let builder = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [cells; 3]);
+    let body = world.insert(builder).expect("a valid cube");
+    world.step(&mut physics);
+    let factor = world.counters().factor_bytes;
+    world.prepare(&physics).expect("a valid step");
+    world.step(&mut physics);
+    let nodes = world.bodies[body].vertex_count();
+    println!(
+        "{tets:>6} tets, {nodes:>5} nodes: factor {:>7.2} MB, columns {:>7.2} MB if all of the surface is prepared, state {:>5.3} MB",
+        factor as f64 * 1e-6,
+        world.counters().column_bytes as f64 * 1e-6,
+        // Position and velocity.
+        (48 * nodes) as f64 * 1e-6
+    );
+}
+
+fn main() {
+    println!("one thread: elements and solves");
+    in_pool(1, || {
+        for cells in [[11, 3, 3], [32, 5, 5], [49, 9, 9]] {
+            beam(cells, FactorPrecision::Double);
+            beam(cells, FactorPrecision::Single);
+        }
+    });
+    println!("\nmemory per body");
+    in_pool(1, || [(1080, 6), (3645, 9), (13720, 14)].map(|(tets, cells)| memory(tets, cells)));
+    let all = std::thread::available_parallelism().map_or(1, |n| n.get());
+    println!("\nequal cubes of 480 tets landing; mean over the landing");
+    println!("{:>6} {:>12} {:>12} {:>12} {:>8}", "bodies", "1 thread", "per body", "all threads", "ratio");
+    for count in [1, 2, 4, 8, 16, 32, 64] {
+        // Alternating, so that a busy machine is busy for both.
+        let (mut one, mut many) = (Vec::new(), Vec::new());
+        for _ in 0..3 {
+            one.push(landing(count, 1));
+            many.push(landing(count, all));
+        }
+        let (one, many) = (median(one), median(many));
+        println!(
+            "{count:>6} {one:>9.3} ms {:>9.4} ms {many:>9.3} ms {:>8.2}",
+            one / count as f64,
+            one / many
+        );
+    }
+}
