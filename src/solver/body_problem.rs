@@ -225,8 +225,9 @@ impl BodyProblem {
 
     /// Where the step turns the body, puts the finite rotation in the place of the linear one: about
     /// the centre of mass c the trial gains `(exp ω − I − ω×)(x − c)`, ω the mean rotation of the step.
-    /// A linear rotation by θ stretches everything by θ²/2, which a stiff body takes for a blow. True
-    /// if there was something to bend: contacts then want another iteration.
+    /// A linear rotation by θ stretches everything by θ²/2, which a stiff body takes for a blow. What
+    /// it takes back draws contacts apart rather than together. True if there was something to bend:
+    /// contacts then want another iteration.
     pub fn bend_step_to_rotation(&mut self) -> bool {
         if self.metric.is_per_node() || !self.key.pins.is_empty() {
             return false;

@@ -65,10 +65,9 @@ impl Island {
         self.accelerations.resize_with(self.bodies.len(), Lbfgs::default);
         self.accelerations.iter_mut().for_each(Lbfgs::clear);
         let iterations = self.bodies.iter().map(|b| b.settings.max_iterations).max().unwrap_or(0);
-        for iteration in 1..=iterations {
+        for _ in 0..iterations {
             self.report.iterations += 1;
-            let last = iteration == iterations;
-            let outcome = self.iterate(factors, partners, h, limits, last);
+            let outcome = self.iterate(factors, partners, h, limits);
             let converged =
                 |b: &BodyProblem| b.residual() <= b.settings.tolerance.max(ROUNDING) * b.force_scale();
             let done = match outcome {
@@ -99,7 +98,6 @@ impl Island {
         partners: &[Partner],
         h: f64,
         limits: &ContactLimits,
-        last: bool,
     ) -> Outcome {
         let mut outcome;
         loop {
@@ -113,12 +111,9 @@ impl Island {
             }
             if !self.contacts.is_empty() {
                 self.solve_contacts(factors, partners, h, limits);
-                // The last iteration leaves contacts as they were solved for.
-                if !last {
-                    for body in &mut self.bodies {
-                        if body.bend_step_to_rotation() {
-                            outcome = Outcome::Turned;
-                        }
+                for body in &mut self.bodies {
+                    if body.bend_step_to_rotation() {
+                        outcome = Outcome::Turned;
                     }
                 }
             }
