@@ -48,6 +48,7 @@ pub use body::{
     Acceleration, BodyError, DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet,
     DeformableModel, DeformableState, FactorPrecision, Frames, Pin, SolverSettings, SystemMatrix,
 };
+pub use coupling::PhysicsParts;
 pub use energy::Elasticity;
 pub use error::{DeformableBodyError, HandleError};
 pub use material::{DeformableMaterial, MaterialError};
@@ -62,7 +63,7 @@ pub mod prelude {
         Acceleration, DeformableBody, DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle,
         DeformableBodySet, DeformableContact, DeformableCounters, DeformableMaterial, DeformableModel,
         DeformableParameters, DeformablePipeline, DeformableWorld, Elasticity, FactorPrecision, Frames,
-        SolverSettings, SystemMatrix, TetMesh,
+        PhysicsParts, SolverSettings, SystemMatrix, TetMesh,
     };
 }
 

@@ -58,19 +58,11 @@ fn allocations(
     let mut allocated = 0;
     for step in 0..steps {
         let before = COUNT.with(Cell::get);
-        pipeline.before_step(
-            &parameters,
-            physics.gravity,
-            physics.integration_parameters.dt,
-            &mut set,
-            &mut physics.bodies,
-            &physics.colliders,
-            &physics.multibody_joints,
-        );
+        pipeline.before_step(&parameters, &mut set, &mut PhysicsParts::from(&mut physics));
         let ours = COUNT.with(Cell::get) - before;
         physics.step();
         // Not counted: writing to a rigid body makes rapier note it in a list, which its step gave away.
-        pipeline.after_step(&mut physics.bodies);
+        pipeline.after_step(&mut PhysicsParts::from(&mut physics));
         if step + counted >= steps {
             allocated += ours;
         }

@@ -187,18 +187,10 @@ fn own_loops_get_the_same_bits_as_the_world() {
     let (mut own, mut other, _) = scene();
     for _ in 0..60 {
         world.step(&mut physics);
-        let dt = own.integration_parameters.dt;
-        other.pipeline.before_step(
-            &other.parameters,
-            own.gravity,
-            dt,
-            &mut other.bodies,
-            &mut own.bodies,
-            &own.colliders,
-            &own.multibody_joints,
-        );
+        let mut parts = PhysicsParts::from(&mut own);
+        other.pipeline.before_step(&other.parameters, &mut other.bodies, &mut parts);
         own.step();
-        other.pipeline.after_step(&mut own.bodies);
+        other.pipeline.after_step(&mut PhysicsParts::from(&mut own));
     }
     assert_eq!(world.bodies[body].state(), other.bodies[body].state());
 }

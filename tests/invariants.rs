@@ -111,16 +111,8 @@ fn steps_of_unusable_length_are_skipped() {
     let body = world.insert(cube(DeformableMaterial::new(1e6, 0.3), 0.25)).unwrap();
     let before = world.bodies[body].state().clone();
     for dt in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        let sets = (&mut world.bodies, &mut physics.bodies);
-        world.pipeline.before_step(
-            &world.parameters,
-            physics.gravity,
-            dt,
-            sets.0,
-            sets.1,
-            &physics.colliders,
-            &physics.multibody_joints,
-        );
+        let mut parts = PhysicsParts { dt, ..PhysicsParts::from(&mut physics) };
+        world.pipeline.before_step(&world.parameters, &mut world.bodies, &mut parts);
         assert!(world.pipeline.counters().skipped);
         assert!(world.pipeline.prepare(&world.bodies, dt).is_err());
     }

@@ -102,6 +102,7 @@ impl DeformableBody {
             x: model.rest.clone(),
             v: vec![Vec3::zeros(); model.rest.len()],
             contacts: Vec::new(),
+            closure: Vec::new(),
         };
         Self {
             model,
@@ -300,6 +301,7 @@ impl DeformableBody {
         self.state.v.iter_mut().for_each(|v| *v = pose.rotation * *v);
         self.pins.iter_mut().for_each(|p| p.target = pose.transform(&p.target));
         self.state.contacts.clear();
+        self.state.closure.clear();
         Ok(())
     }
 

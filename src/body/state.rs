@@ -12,6 +12,9 @@ pub struct DeformableState {
     pub(crate) v: Vec<Vec3>,
     /// Contacts of the last step, ascending by key: warm starts of the next.
     pub(crate) contacts: Vec<ContactMemory>,
+    /// What held the rigid bodies of the island in the last step, ascending by key; with the first body
+    /// of the island.
+    pub(crate) closure: Vec<ContactMemory>,
 }
 
 /// Names a contact over several steps.
@@ -59,6 +62,12 @@ impl DeformableState {
     pub(crate) fn contact(&self, key: &ContactKey) -> Option<&ContactMemory> {
         let place = self.contacts.binary_search_by(|c| c.key.cmp(key));
         place.ok().map(|i| &self.contacts[i])
+    }
+
+    /// The row between rigid bodies of the last step with this key.
+    pub(crate) fn closure_row(&self, key: &ContactKey) -> Option<&ContactMemory> {
+        let place = self.closure.binary_search_by(|c| c.key.cmp(key));
+        place.ok().map(|i| &self.closure[i])
     }
 
     /// The contacts of the last step with one obstacle.

@@ -1,12 +1,16 @@
 //! The Coulomb friction cone `‖λ_t‖ ≤ μ λ_n`: projection of a force onto it, and its derivative.
 //!
+//! Rows that hold take part as intervals: a line without a limit, a segment with one.
+//!
 //! All of it is for a metric that is the same in every direction of one contact, `R` [m/N]: then
 //! the projection of u = −ĝ/R is closed [De Saxcé & Feng 1998; Castro et al. 2022].
+
+use super::Law;
 
 /// Where a contact is on its cone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ConeState {
-    /// No force.
+    /// No force, or no more than the limit: the force does not depend on the gap.
     Open,
     /// On the surface of the cone: slips, if there is friction to slip against.
     Slip,
@@ -21,9 +25,15 @@ pub(crate) struct Projected {
     pub state: ConeState,
 }
 
-/// Nearest point of the cone of friction `mu` to `u`. Of `u` only the first component counts
-/// without friction.
-pub(crate) fn project(u: [f64; 3], mu: f64) -> Projected {
+/// Nearest force to `u` that the law allows. Of `u` only the first component counts without friction.
+pub(crate) fn project(u: [f64; 3], law: Law) -> Projected {
+    let mu = match law {
+        Law::Contact { friction } => friction,
+        Law::Held { limit } => {
+            let state = if u[0].abs() < limit { ConeState::Stick } else { ConeState::Open };
+            return Projected { force: [u[0].clamp(-limit, limit), 0.0, 0.0], state };
+        }
+    };
     if mu == 0.0 {
         let state = if u[0] > 0.0 { ConeState::Stick } else { ConeState::Open };
         return Projected { force: [u[0].max(0.0), 0.0, 0.0], state };
@@ -42,8 +52,12 @@ pub(crate) fn project(u: [f64; 3], mu: f64) -> Projected {
 
 /// Columns of `L` with `L Lᵀ = (1/R)·∂force/∂u` at `u`: the curvature of the contact, in `1/R`.
 /// Returns their number: none if open, one without friction, two if slipping, three if sticking.
-pub(crate) fn curvature_columns(u: [f64; 3], mu: f64, R: f64, columns: &mut [[f64; 3]; 3]) -> usize {
-    let projected = project(u, mu);
+pub(crate) fn curvature_columns(u: [f64; 3], law: Law, R: f64, columns: &mut [[f64; 3]; 3]) -> usize {
+    let projected = project(u, law);
+    let mu = match law {
+        Law::Contact { friction } => friction,
+        Law::Held { .. } => 0.0,
+    };
     let root = (1.0 / R).sqrt();
     match projected.state {
         ConeState::Open => 0,
@@ -63,6 +77,15 @@ pub(crate) fn curvature_columns(u: [f64; 3], mu: f64, R: f64, columns: &mut [[f6
     }
 }
 
+/// What the projection near `u` is besides its derivative times the point: nothing on a cone, the limit
+/// of a row that holds no more.
+pub(crate) fn constant_part(u: [f64; 3], law: Law) -> f64 {
+    match law {
+        Law::Held { limit } if u[0].abs() >= limit => limit.copysign(u[0]),
+        _ => 0.0,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -75,7 +98,7 @@ mod tests {
     proptest! {
         #[test]
         fn projection_is_feasible_and_the_rest_is_in_the_polar_cone(u in vector(), mu in 0.05..2.0f64) {
-            let p = project(u, mu).force;
+            let p = project(u, Law::Contact { friction: mu }).force;
             let tangential = |v: [f64; 3]| (v[1] * v[1] + v[2] * v[2]).sqrt();
             // Roundings of numbers of size 2.
             prop_assert!(tangential(p) <= mu * p[0] + 1e-14);
@@ -88,7 +111,8 @@ mod tests {
         fn curvature_is_the_derivative_of_the_projection(u in vector(), mu in 0.05..2.0f64, d in vector()) {
             let R = 0.7;
             let mut columns = [[0.0; 3]; 3];
-            let n = curvature_columns(u, mu, R, &mut columns);
+            let n = curvature_columns(u, Law::Contact { friction: mu }, R, &mut columns);
+            let mu = Law::Contact { friction: mu };
             let at = |t: f64| [0, 1, 2].map(|k| u[k] + t * d[k]);
             let eps = 1e-6;
             prop_assume!(project(at(eps), mu).state == project(at(-eps), mu).state);

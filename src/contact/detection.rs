@@ -2,7 +2,7 @@
 
 use super::obstacle::Obstacle;
 use super::rim_rows::{corner_on_triangle, corners_in, rim_crossing};
-use super::row::{Row, Side};
+use super::row::{Law, Row, Side};
 use super::surface_point::{Scales, SurfacePoint, surface_point};
 use super::triangle_rows::triangle_point;
 use crate::body::{ContactKey, ContactMemory, DeformableModel};
@@ -307,7 +307,7 @@ impl Scene<'_> {
         let key = ContactKey { obstacle: obstacle.key, part: obstacle.part, feature, slot: 0 };
         let normal = obstacle.start.rotation * found.normal;
         let mut row = Row::new([soft, partner], normal.normalize(), found.gap, key);
-        row.friction = self.pair.friction;
+        row.law = Law::Contact { friction: self.pair.friction };
         row.restitution = self.pair.restitution;
         row
     }

@@ -15,4 +15,4 @@ mod triangle_rows;
 pub(crate) use candidates::Candidates;
 pub(crate) use detection::{Detector, Pair};
 pub(crate) use obstacle::{Obstacle, PartnerId};
-pub(crate) use row::{Row, Side};
+pub(crate) use row::{Law, Row, Side};

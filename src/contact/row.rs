@@ -17,6 +17,18 @@ pub(crate) enum Side {
     },
     /// A point of a rigid body, at the start of the step \[m\].
     Partner { partner: PartnerId, point: Vec3 },
+    /// The turning of a rigid body: directions are axes then, gaps angles \[rad\] and forces
+    /// moments \[N m\].
+    Turn { partner: PartnerId },
+}
+
+/// What forces a row may take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Law {
+    /// Pushes, and rubs within the friction cone.
+    Contact { friction: f64 },
+    /// Holds in both directions along the normal, with no more than `limit` \[N\].
+    Held { limit: f64 },
 }
 
 /// A contact. Forces are positive on side 0 and negative on side 1.
@@ -27,7 +39,9 @@ pub(crate) struct Row {
     pub frame: [Vec3; 3],
     /// Distance along the normal at the start of the step \[m\].
     pub gap: f64,
-    pub friction: f64,
+    pub law: Law,
+    /// Displacement per force that the row itself gives way by [m/N].
+    pub compliance: f64,
     pub restitution: f64,
     pub key: ContactKey,
     /// Force on side 0 in the last step \[N\].
@@ -43,7 +57,8 @@ impl Row {
             sides,
             frame: [normal, t1, t2],
             gap,
-            friction: 0.0,
+            law: Law::Contact { friction: 0.0 },
+            compliance: 0.0,
             restitution: 0.0,
             key,
             warm_force: Vec3::zeros(),
@@ -53,7 +68,15 @@ impl Row {
 
     /// Rows of this contact in the solver: three, or one without friction.
     pub fn dimension(&self) -> usize {
-        if self.friction > 0.0 { 3 } else { 1 }
+        match self.law {
+            Law::Contact { friction } if friction > 0.0 => 3,
+            _ => 1,
+        }
+    }
+
+    /// Whether it is between rigid bodies.
+    pub fn is_closure(&self) -> bool {
+        self.sides.iter().all(|side| side.partner().is_some())
     }
 
     /// Directions of those rows.
@@ -73,10 +96,18 @@ impl Side {
     pub fn soft_nodes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         let (nodes, weights) = match self {
             Side::Soft { nodes, weights, .. } => (*nodes, *weights),
-            Side::Partner { .. } => ([0; 3], [0.0; 3]),
+            Side::Partner { .. } | Side::Turn { .. } => ([0; 3], [0.0; 3]),
         };
         let pairs = nodes.into_iter().zip(weights);
         pairs.filter(|(_, w)| *w != 0.0).map(|(n, w)| (n as usize, w))
+    }
+
+    /// The rigid partner of a side that has one.
+    pub fn partner(&self) -> Option<PartnerId> {
+        match self {
+            Side::Soft { .. } => None,
+            Side::Partner { partner, .. } | Side::Turn { partner } => Some(*partner),
+        }
     }
 
     /// Value of a nodal field at a soft side.

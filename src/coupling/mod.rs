@@ -3,19 +3,14 @@
 //! Architecture invariant: the only room that reads and writes rapier's sets; `pipeline` passes them on.
 //! Everything below works on obstacles, partners and rows.
 
+mod closure;
+mod joint_rows;
 mod obstacles;
+mod parts;
 mod reactions;
 
+pub(crate) use closure::Closure;
 pub(crate) use obstacles::{RapierScene, combined};
+pub use parts::PhysicsParts;
+pub(crate) use parts::RapierSets;
 pub(crate) use reactions::Reactions;
-
-use rapier3d::dynamics::{MultibodyJointSet, RigidBodySet};
-use rapier3d::geometry::ColliderSet;
-
-/// The sets of a rapier world that coupling reads.
-#[derive(Clone, Copy)]
-pub(crate) struct RapierSets<'a> {
-    pub bodies: &'a RigidBodySet,
-    pub colliders: &'a ColliderSet,
-    pub multibody_joints: &'a MultibodyJointSet,
-}

@@ -1,10 +1,10 @@
 //! Colliders and rigid bodies as obstacles and partners.
 
-use super::RapierSets;
+use super::parts::RapierSets;
 use crate::body::DeformableBody;
 use crate::contact::{Obstacle, PartnerId};
 use crate::math::{Mat3, Pose64, Vec3, from_real, rotation_from_vector};
-use crate::solver::Partner;
+use crate::solver::{Partner, Partners, Twist};
 use parry3d::shape::{SharedShape, TypedShape};
 use rapier3d::dynamics::{
     CoefficientCombineRule, RigidBody, RigidBodyHandle, RigidBodyMassProps, RigidBodyType,
@@ -18,7 +18,7 @@ use std::sync::Arc;
 #[derive(Default)]
 pub(crate) struct RapierScene {
     pub obstacles: Vec<Obstacle>,
-    pub partners: Vec<Partner>,
+    pub partners: Partners,
     /// Rigid body of each partner; none for colliders without one.
     pub handles: Vec<Option<RigidBodyHandle>>,
     /// Collider of each obstacle.
@@ -53,7 +53,7 @@ impl RapierScene {
                     let partner = self.partner(sets, body_handle, body, gravity, dt);
                     let offset = collider.position_wrt_parent().map(Pose64::from_real);
                     let start = Pose64::from_real(body.position());
-                    let end = end_pose(&self.partners[partner.0 as usize], &start, dt);
+                    let end = end_pose(self.partners.get(partner), &start, dt);
                     let place = |pose: Pose64| offset.map_or(pose, |offset| pose.compose(&offset));
                     (partner, place(start), place(end))
                 }
@@ -74,6 +74,34 @@ impl RapierScene {
         ColliderHandle::from_raw_parts((key >> 32) as u32, key as u32)
     }
 
+    /// The partner of a body; read now if none of its colliders was.
+    pub fn body_partner(
+        &mut self,
+        sets: RapierSets<'_>,
+        handle: RigidBodyHandle,
+        gravity: Vector,
+        dt: f64,
+    ) -> Option<PartnerId> {
+        let body = sets.bodies.get(handle)?;
+        Some(self.partner(sets, handle, body, gravity, dt))
+    }
+
+    /// The partner of a collider: its body, or a fixed one of its own.
+    pub fn collider_partner(
+        &mut self,
+        sets: RapierSets<'_>,
+        handle: ColliderHandle,
+        gravity: Vector,
+        dt: f64,
+    ) -> Option<PartnerId> {
+        let collider = sets.colliders.get(handle)?;
+        if let Some(body) = collider.parent() {
+            return self.body_partner(sets, body, gravity, dt);
+        }
+        let pose = Pose64::from_real(collider.position());
+        Some(self.push_partner(Partner::Prescribed { start: pose, end: pose }, None))
+    }
+
     fn partner(
         &mut self,
         sets: RapierSets<'_>,
@@ -92,9 +120,8 @@ impl RapierScene {
     }
 
     fn push_partner(&mut self, partner: Partner, handle: Option<RigidBodyHandle>) -> PartnerId {
-        self.partners.push(partner);
         self.handles.push(handle);
-        PartnerId(self.partners.len() as u32 - 1)
+        self.partners.push(partner)
     }
 
     fn push_shape(
@@ -207,10 +234,11 @@ fn partner_of(
                 com: from_real(masses.world_com),
                 inv_mass,
                 inv_inertia,
-                linvel,
-                angvel,
-                free_linvel: linvel + inv_mass.component_mul(&force) * dt,
-                free_angvel: angvel + inv_inertia * torque * dt,
+                twist: Twist { linear: linvel, angular: angvel },
+                free: Twist {
+                    linear: linvel + inv_mass.component_mul(&force) * dt,
+                    angular: angvel + inv_inertia * torque * dt,
+                },
             }
         }
     }
@@ -237,9 +265,9 @@ pub(super) fn external_force(body: &RigidBody, masses: &RigidBodyMassProps, grav
 fn end_pose(partner: &Partner, start: &Pose64, dt: f64) -> Pose64 {
     match partner {
         Partner::Prescribed { end, .. } => *end,
-        Partner::Rigid { com, free_linvel, free_angvel, .. } => {
-            let turn = rotation_from_vector(&(free_angvel * dt));
-            let origin: Vec3 = com + free_linvel * dt + turn * (start.translation - com);
+        Partner::Rigid { com, free, .. } | Partner::Link { com, free, .. } => {
+            let turn = rotation_from_vector(&(free.angular * dt));
+            let origin: Vec3 = com + free.linear * dt + turn * (start.translation - com);
             Pose64 { rotation: turn * start.rotation, translation: origin }
         }
     }

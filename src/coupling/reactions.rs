@@ -4,17 +4,20 @@
 //! it gets the *impulse* h·(f_ext + reaction) and the *force* −f_ext for the coming step: its substeps
 //! then find nothing to accelerate it. The user's force is put back afterwards.
 
+use super::closure::Closure;
 use super::obstacles::{RapierScene, current_mass_properties, external_force};
+use super::parts::PhysicsParts;
 use crate::math::{from_real, to_real};
 use crate::solver::{Partner, Reaction};
-use rapier3d::dynamics::{RigidBodyHandle, RigidBodySet};
-use rapier3d::geometry::ColliderSet;
+use rapier3d::dynamics::{ImpulseJointHandle, JointAxesMask, RigidBodyHandle};
 use rapier3d::math::Vector;
 
 /// Forces that were replaced for the duration of rapier's step.
 #[derive(Default)]
 pub(crate) struct Reactions {
     replaced: Vec<Replaced>,
+    /// Motors that rest during rapier's step.
+    stilled: Vec<(ImpulseJointHandle, JointAxesMask)>,
 }
 
 struct Replaced {
@@ -32,15 +35,20 @@ impl Reactions {
     /// by the inverse masses that the solve used: rapier's own are zero before its first step.
     pub fn write(
         &mut self,
-        bodies: &mut RigidBodySet,
-        colliders: &ColliderSet,
-        gravity: Vector,
-        dt: f32,
+        parts: &mut PhysicsParts<'_>,
         scene: &RapierScene,
         reactions: &[Reaction],
+        closure: &Closure,
     ) {
         self.replaced.clear();
-        for ((handle, partner), reaction) in scene.handles.iter().zip(&scene.partners).zip(reactions) {
+        self.write_bodies(parts, scene, reactions);
+        self.still_motors(parts, closure);
+    }
+
+    fn write_bodies(&mut self, parts: &mut PhysicsParts<'_>, scene: &RapierScene, reactions: &[Reaction]) {
+        let (gravity, dt) = (parts.gravity, parts.dt);
+        let (bodies, colliders) = (&mut *parts.bodies, parts.colliders);
+        for ((handle, partner), reaction) in scene.handles.iter().zip(&scene.partners.list).zip(reactions) {
             let (Some(handle), Partner::Rigid { inv_mass, inv_inertia, .. }) = (*handle, partner) else {
                 continue;
             };
@@ -72,9 +80,25 @@ impl Reactions {
         }
     }
 
-    /// Puts the users' forces back after rapier's step; forces that its callbacks have added in the
-    /// meantime are kept.
-    pub fn take_back(&mut self, bodies: &mut RigidBodySet) {
+    /// Motors that were solved here rest in rapier's step, or they would act twice.
+    fn still_motors(&mut self, parts: &mut PhysicsParts<'_>, closure: &Closure) {
+        self.stilled.clear();
+        for &handle in &closure.driven {
+            let Some(joint) = parts.impulse_joints.get_mut(handle, false) else { continue };
+            self.stilled.push((handle, joint.data.motor_axes));
+            joint.data.motor_axes = JointAxesMask::empty();
+        }
+    }
+
+    /// Puts the users' forces and motors back after rapier's step; forces that its callbacks have added in
+    /// the meantime are kept.
+    pub fn take_back(&mut self, parts: &mut PhysicsParts<'_>) {
+        for (handle, axes) in self.stilled.drain(..) {
+            if let Some(joint) = parts.impulse_joints.get_mut(handle, false) {
+                joint.data.motor_axes |= axes;
+            }
+        }
+        let bodies = &mut *parts.bodies;
         for replaced in self.replaced.drain(..) {
             let Some(body) = bodies.get_mut(replaced.handle) else {
                 continue;

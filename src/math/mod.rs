@@ -79,6 +79,11 @@ pub(crate) fn rotation_from_vector(w: &Vec3) -> Mat3 {
     nalgebra::Rotation3::new(*w).into_inner()
 }
 
+/// Rotation vector \[rad\] of a rotation.
+pub(crate) fn rotation_vector(R: &Mat3) -> Vec3 {
+    nalgebra::Rotation3::from_matrix_unchecked(*R).scaled_axis()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,31 +1,31 @@
 //! Which bodies have to be solved together: those that touch the same yielding partner, directly or
-//! through others.
+//! through what holds it.
 
 use super::work::{BodyWork, IslandWork};
-use crate::contact::Side;
-use crate::solver::Partner;
+use crate::contact::Row;
+use crate::solver::Partners;
 
 /// Memory for forming islands.
 #[derive(Default)]
 pub(super) struct Grouping {
-    /// A body of the same group with a smaller index, or itself.
+    /// Bodies, then partners: a member of the same group with a smaller index, or itself.
     parent: Vec<usize>,
-    /// The first body that touches each partner.
-    first_on_partner: Vec<Option<usize>>,
     /// The island of each group, at the group's first body.
     island_of_root: Vec<Option<usize>>,
+    bodies: usize,
 }
 
 impl Grouping {
-    /// Moves the problems and rows of all bodies into islands, ordered by their first bodies; returns
-    /// how many there are.
+    /// Moves the problems and rows of all bodies, and the rows between their partners, into islands,
+    /// ordered by their first bodies; returns how many there are.
     pub fn form(
         &mut self,
         works: &mut [BodyWork],
-        partners: &[Partner],
+        closure: &mut Vec<Row>,
+        partners: &Partners,
         islands: &mut Vec<IslandWork>,
     ) -> usize {
-        self.join(works, partners);
+        self.join(works, closure, partners);
         for island in islands.iter_mut() {
             island.members.clear();
             island.island.contacts.rows.clear();
@@ -42,31 +42,58 @@ impl Grouping {
             }
             islands[place].take_in(index, &mut works[index]);
         }
+        for row in closure.drain(..) {
+            let root = self.yielding(&row, partners).next().map(|p| self.root_of(p));
+            // Partners that no body touches have an index beyond the bodies for their root.
+            if let Some(Some(place)) = root.and_then(|root| self.island_of_root.get(root)) {
+                islands[*place].island.contacts.rows.push(row);
+            }
+        }
         islands.truncate(count);
         count
     }
 
-    fn join(&mut self, works: &[BodyWork], partners: &[Partner]) {
+    fn join(&mut self, works: &[BodyWork], closure: &[Row], partners: &Partners) {
+        self.bodies = works.len();
         self.parent.clear();
-        self.parent.extend(0..works.len());
-        self.first_on_partner.clear();
-        self.first_on_partner.resize(partners.len(), None);
+        self.parent.extend(0..works.len() + partners.list.len());
         for (index, work) in works.iter().enumerate() {
-            for side in work.rows.iter().flat_map(|row| &row.sides) {
-                let Side::Partner { partner, .. } = side else { continue };
-                if partners[partner.0 as usize].yields() {
-                    let other = *self.first_on_partner[partner.0 as usize].get_or_insert(index);
-                    let (a, b) = (self.root(other), self.root(index));
-                    self.parent[a.max(b)] = a.min(b);
+            for row in &work.rows {
+                for partner in self.yielding(row, partners) {
+                    self.unite(index, partner);
                 }
+            }
+        }
+        for row in closure {
+            let mut ends = self.yielding(row, partners);
+            if let (Some(a), Some(b)) = (ends.next(), ends.next()) {
+                self.unite(a, b);
             }
         }
     }
 
+    /// Places of the yielding partners of a row.
+    fn yielding<'a>(&self, row: &'a Row, partners: &'a Partners) -> impl Iterator<Item = usize> + use<'a> {
+        let first = self.bodies;
+        let ends = row.sides.iter().filter_map(|side| side.partner());
+        let yielding = ends.filter(|partner| partners.yields(*partner));
+        yielding.map(move |partner| first + partners.group(partner).0 as usize)
+    }
+
+    fn unite(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parent[a.max(b)] = a.min(b);
+    }
+
     fn root(&mut self, i: usize) -> usize {
+        let root = self.root_of(i);
+        self.parent[i] = root;
+        root
+    }
+
+    fn root_of(&self, i: usize) -> usize {
         let mut at = i;
         while self.parent[at] != at {
-            self.parent[at] = self.parent[self.parent[at]];
             at = self.parent[at];
         }
         at

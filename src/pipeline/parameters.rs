@@ -13,6 +13,10 @@ pub struct DeformableParameters {
     pub max_corrective_velocity: f64,
     /// New contacts that approach below this speed [m/s] do not bounce.
     pub restitution_threshold: f64,
+    /// Rigid bodies, at the most, whose contacts and joints with other rigid bodies enter the solve,
+    /// counted from the touched ones outward. Zero leaves these to rapier alone: its contacts are springs
+    /// that give way under loads many times the body's own weight.
+    pub closure_bodies: usize,
     /// Memory \[bytes\] for columns of inverses, kept between steps for contacts.
     pub column_budget: usize,
 }
@@ -23,6 +27,7 @@ impl Default for DeformableParameters {
             contact_tolerance: 1.0e-8,
             max_corrective_velocity: 1.0,
             restitution_threshold: 0.5,
+            closure_bodies: 64,
             column_budget: 512 << 20,
         }
     }
@@ -55,6 +60,8 @@ pub struct DeformableCounters {
     pub contacts: usize,
     /// Contacts that carry force.
     pub active_contacts: usize,
+    /// Rows of what holds the touched rigid bodies: rapier's contacts and joints.
+    pub closure_rows: usize,
     /// Global iterations, summed over islands.
     pub iterations: usize,
     /// Bodies that stopped at their iteration limit, above their tolerance.

@@ -1,8 +1,8 @@
 //! The step.
 //!
 //! ```text
-//! read_obstacles → predict → detect → prepare_factors → form_islands → solve → advance
-//! → write_reactions → (rapier steps) → after_step
+//! read_obstacles → predict → detect → close → prepare_factors → form_islands → solve → advance
+//! → write reactions → (rapier steps) → after_step
 //! ```
 
 use super::contacts::DeformableContact;
@@ -12,12 +12,10 @@ use super::threads::for_each;
 use super::work::{BodyWork, IslandWork};
 use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, is_number};
 use crate::contact::{Candidates, Side};
-use crate::coupling::{RapierScene, RapierSets, Reactions};
+use crate::coupling::{Closure, PhysicsParts, RapierScene, RapierSets, Reactions};
 use crate::error::DeformableBodyError;
 use crate::math::{Vec3, from_real, to_real};
 use crate::solver::{FactorCache, FactorKey, ROUNDING, Reaction};
-use rapier3d::dynamics::{MultibodyJointSet, RigidBodySet};
-use rapier3d::geometry::ColliderSet;
 use rapier3d::math::Vector;
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
@@ -36,6 +34,7 @@ pub struct DeformablePipeline {
     factors: FactorCache,
     islands: Vec<IslandWork>,
     grouping: Grouping,
+    closure: Closure,
     reaction_list: Vec<Reaction>,
     reactions: Reactions,
     contacts: Vec<DeformableContact>,
@@ -48,47 +47,45 @@ impl DeformablePipeline {
         Self::default()
     }
 
-    /// Steps all bodies of `deformables` by `dt` \[s\] under `gravity` [m/s²] and hands rapier what
-    /// they do to its bodies. Never fails: a `dt` that is not positive and finite, or a gravity that
-    /// is not finite, skips the step ([`DeformableCounters::skipped`]).
+    /// Steps all bodies of `deformables` by `parts.dt` \[s\] and hands rapier what they do to its bodies.
+    /// Never fails: a `dt` that is not positive and finite, or a gravity that is not finite, skips the
+    /// step ([`DeformableCounters::skipped`]).
     pub fn before_step(
         &mut self,
         parameters: &DeformableParameters,
-        gravity: Vector,
-        dt: f32,
         deformables: &mut DeformableBodySet,
-        bodies: &mut RigidBodySet,
-        colliders: &ColliderSet,
-        multibody_joints: &MultibodyJointSet,
+        parts: &mut PhysicsParts<'_>,
     ) {
         self.counters = DeformableCounters::default();
         self.contacts.clear();
         // If the last step was not ended by `after_step`, the users' forces are still ours to return.
-        self.reactions.take_back(bodies);
+        self.reactions.take_back(parts);
+        let (gravity, dt) = (parts.gravity, parts.dt);
         if !(dt.is_finite() && dt > 0.0 && gravity.is_finite()) {
             self.counters.skipped = true;
             return;
         }
         let h = f64::from(dt);
-        let sets = RapierSets { bodies, colliders, multibody_joints };
+        let sets = parts.sets();
         let mut clock = Clock::start();
         self.read_obstacles(sets, gravity, h);
         self.predict(deformables, gravity, h);
         self.detect(deformables, sets);
+        self.close(sets, gravity, h, parameters.closure_bodies);
         self.counters.detection_time = clock.lap();
         self.prepare_factors(deformables, h, parameters.column_budget);
-        self.form_islands();
+        self.form_islands(deformables);
         self.counters.factor_time = clock.lap();
         self.solve(parameters, h);
         self.counters.solve_time = clock.lap();
         self.advance(deformables, h);
-        self.write_reactions(bodies, colliders, gravity, dt);
+        self.reactions.write(parts, &self.scene, &self.reaction_list, &self.closure);
         self.counters.advance_time = clock.lap();
     }
 
-    /// Puts the users' forces on rapier's bodies back. To be called after rapier's step.
-    pub fn after_step(&mut self, bodies: &mut RigidBodySet) {
-        self.reactions.take_back(bodies);
+    /// Puts the users' forces and motors back. To be called after rapier's step.
+    pub fn after_step(&mut self, parts: &mut PhysicsParts<'_>) {
+        self.reactions.take_back(parts);
     }
 
     /// Makes factors, and columns for contact anywhere on the surface, ahead of time.
@@ -175,8 +172,23 @@ impl DeformablePipeline {
         self.counters.column_bytes = self.factors.column_bytes();
     }
 
-    fn form_islands(&mut self) {
-        self.counters.islands = self.grouping.form(&mut self.works, &self.scene.partners, &mut self.islands);
+    /// Finds what else holds the rigid bodies that are touched.
+    fn close(&mut self, sets: RapierSets<'_>, gravity: Vector, h: f64, limit: usize) {
+        let sides = self.works.iter().flat_map(|work| &work.rows).flat_map(|row| &row.sides);
+        let touched = sides.filter_map(|side| side.partner());
+        self.closure.walk(&mut self.scene, sets, touched, gravity, h, limit);
+        self.counters.closure_rows = self.closure.rows.len();
+    }
+
+    fn form_islands(&mut self, deformables: &DeformableBodySet) {
+        let (works, closure) = (&mut self.works, &mut self.closure.rows);
+        self.counters.islands = self.grouping.form(works, closure, &self.scene.partners, &mut self.islands);
+        for work in &mut self.islands {
+            for member in 0..work.members.len() {
+                let handle = self.works[work.members[member]].handle;
+                work.recall_closure(deformables[handle].state());
+            }
+        }
     }
 
     fn solve(&mut self, parameters: &DeformableParameters, h: f64) {
@@ -190,7 +202,7 @@ impl DeformablePipeline {
 
     fn advance(&mut self, deformables: &mut DeformableBodySet, h: f64) {
         self.reaction_list.clear();
-        self.reaction_list.resize(self.scene.partners.len(), Reaction::default());
+        self.reaction_list.resize(self.scene.partners.list.len(), Reaction::default());
         for work in &mut self.islands {
             let finite = work.is_finite();
             for (local, &index) in work.members.iter().enumerate() {
@@ -214,16 +226,6 @@ impl DeformablePipeline {
         }
         self.counters.active_contacts = self.contacts.iter().filter(|c| c.force != Vector::ZERO).count();
         self.idle.extend(self.works.drain(..).map(|work| (work.handle, work)));
-    }
-
-    fn write_reactions(
-        &mut self,
-        bodies: &mut RigidBodySet,
-        colliders: &ColliderSet,
-        gravity: Vector,
-        dt: f32,
-    ) {
-        self.reactions.write(bodies, colliders, gravity, dt, &self.scene, &self.reaction_list);
     }
 }
 
@@ -252,6 +254,10 @@ fn store(
         pin.force = problem.pin_force(k);
     }
     work.memory_of(local, h, &mut body.state.contacts);
+    body.state.closure.clear();
+    if local == 0 {
+        work.memory_of_closure(h, &mut body.state.closure);
+    }
     body.report.iterations = work.island.report.iterations;
     body.report.residual = problem.residual();
     body.report.tolerance = problem.settings.tolerance.max(ROUNDING) * problem.force_scale();

@@ -1,6 +1,6 @@
 //! What the pipeline keeps per body from step to step: memory only, nothing that results depend on.
 
-use crate::body::{ContactMemory, DeformableBody, DeformableBodyHandle, is_number};
+use crate::body::{ContactMemory, DeformableBody, DeformableBodyHandle, DeformableState, is_number};
 use crate::contact::{Candidates, Detector, Pair, Row, Side};
 use crate::coupling::{RapierScene, RapierSets, combined};
 use crate::math::Vec3;
@@ -69,10 +69,7 @@ impl BodyWork {
         self.rows.retain_mut(|row| {
             // Between a pinned node and what does not yield there is nothing to solve for.
             let held = row.sides[0].soft_nodes().all(|(n, _)| pinned(n));
-            let yields = |side: &Side| match side {
-                Side::Partner { partner, .. } => scene.partners[partner.0 as usize].yields(),
-                Side::Soft { .. } => false,
-            };
+            let yields = |side: &Side| side.partner().is_some_and(|id| scene.partners.yields(id));
             if let Some(memory) = body.state.contact(&row.key) {
                 row.warm_force = memory.force;
                 row.warm_shift_rate = memory.shift_rate;
@@ -124,6 +121,36 @@ impl IslandWork {
     pub fn is_finite(&self) -> bool {
         self.island.bodies.iter().all(|b| b.current.x.iter().all(is_number))
             && self.island.contacts.lambda.iter().all(|l| l.is_finite())
+    }
+
+    /// Gives the rows between rigid bodies the forces that a member remembers.
+    pub fn recall_closure(&mut self, state: &DeformableState) {
+        for row in self.island.contacts.rows.iter_mut().filter(|row| row.is_closure()) {
+            if let Some(memory) = state.closure_row(&row.key) {
+                row.warm_force = memory.force;
+                row.warm_shift_rate = memory.shift_rate;
+            }
+        }
+    }
+
+    /// What the rows between rigid bodies leave to the next step, ascending by key.
+    pub fn memory_of_closure(&self, h: f64, memory: &mut Vec<ContactMemory>) {
+        memory.clear();
+        let contacts = &self.island.contacts;
+        for (i, row) in contacts.rows.iter().enumerate().filter(|(_, row)| row.is_closure()) {
+            let force = contacts.force(i);
+            if force != Vec3::zeros() {
+                let shift_rate = contacts.shift[i] / h;
+                memory.push(ContactMemory {
+                    key: row.key,
+                    force,
+                    shift_rate,
+                    nodes: [0; 3],
+                    weights: [0.0; 3],
+                });
+            }
+        }
+        memory.sort_unstable_by_key(|m| m.key);
     }
 
     /// What the contacts of a member leave to the next step, ascending by key.

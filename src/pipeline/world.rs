@@ -4,6 +4,7 @@ use super::contacts::DeformableContact;
 use super::parameters::{DeformableCounters, DeformableParameters};
 use super::pipeline::DeformablePipeline;
 use crate::body::{DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet};
+use crate::coupling::PhysicsParts;
 use crate::error::DeformableBodyError;
 use rapier3d::geometry::ColliderHandle;
 use rapier3d::math::Vector;
@@ -83,17 +84,9 @@ impl DeformableWorld {
         hooks: &dyn PhysicsHooks,
         events: &dyn EventHandler,
     ) {
-        self.pipeline.before_step(
-            &self.parameters,
-            physics.gravity,
-            physics.integration_parameters.dt,
-            &mut self.bodies,
-            &mut physics.bodies,
-            &physics.colliders,
-            &physics.multibody_joints,
-        );
+        self.pipeline.before_step(&self.parameters, &mut self.bodies, &mut PhysicsParts::from(&mut *physics));
         physics.step_with_events(hooks, events);
-        self.pipeline.after_step(&mut physics.bodies);
+        self.pipeline.after_step(&mut PhysicsParts::from(physics));
     }
 
     /// Contacts of the last step.

@@ -37,7 +37,7 @@ impl ConeHessian {
         for i in 0..problem.contacts() {
             let u = spatial(&u[problem.offsets[i]..problem.offsets[i + 1]]);
             let mut columns = [[0.0; 3]; 3];
-            size += cone::curvature_columns(u, problem.friction[i], R[i], &mut columns);
+            size += cone::curvature_columns(u, problem.laws[i], R[i], &mut columns);
             self.columns.push(columns);
             self.offsets.push(size);
         }

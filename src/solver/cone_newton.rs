@@ -6,15 +6,15 @@
 //! `f(z) = ½zᵀWz + ½γᵀRγ`, `∇f = W(z − γ)`, in the family of SAP [Castro et al. 2022].
 
 use super::cone_hessian::{ConeHessian, dot, spatial};
-use crate::contact::cone;
+use crate::contact::{Law, cone};
 use crate::math::dense;
 
-/// The data of one problem. `dims[i]` is 3, or 1 without friction; everything else is packed by it.
+/// The data of one problem. A contact has three rows, or one without friction; everything is packed.
 #[derive(Default)]
 pub(crate) struct ConeProblem {
     /// First row of each contact, and the number of rows last.
     pub offsets: Vec<usize>,
-    pub friction: Vec<f64>,
+    pub laws: Vec<Law>,
     /// Delassus operator [m/N], dense, symmetric.
     pub W: Vec<f64>,
     /// Changes whenever W does.
@@ -76,7 +76,7 @@ impl ConeProblem {
     }
 
     pub fn contacts(&self) -> usize {
-        self.friction.len()
+        self.laws.len()
     }
 
     fn w(&self, i: usize, j: usize) -> f64 {
@@ -96,9 +96,9 @@ impl ConeSolver {
         self.set_regularisation(problem, EPSILON);
         self.expected.clear();
         self.expected.extend_from_slice(lambda);
-        for (i, &mu) in problem.friction.iter().enumerate() {
+        for (i, law) in problem.laws.iter().enumerate() {
             let force = &mut self.expected[problem.offsets[i]..problem.offsets[i + 1]];
-            let [normal, a, b] = force else { continue };
+            let (Law::Contact { friction: mu }, [normal, a, b]) = (law, force) else { continue };
             let friction = a.hypot(*b);
             if *normal > 0.0 && shift[i] > 0.0 && friction > 0.0 {
                 let beyond = 1.0 + shift[i] / (mu * self.R[i] * friction);
@@ -239,14 +239,10 @@ impl ConeSolver {
         for i in 0..problem.contacts() {
             let rows = problem.offsets[i]..problem.offsets[i + 1];
             let u = spatial(&self.u[rows.clone()]);
+            let there = spatial(&expected[rows.clone()]);
             let mut columns = [[0.0; 3]; 3];
-            let count = cone::curvature_columns(
-                spatial(&expected[rows.clone()]),
-                problem.friction[i],
-                self.R[i],
-                &mut columns,
-            );
-            let mut force = [0.0; 3];
+            let count = cone::curvature_columns(there, problem.laws[i], self.R[i], &mut columns);
+            let mut force = [cone::constant_part(there, problem.laws[i]), 0.0, 0.0];
             for column in &columns[..count] {
                 let along = self.R[i] * dot(column, &u);
                 (0..3).for_each(|k| force[k] += column[k] * along);
@@ -291,7 +287,7 @@ impl ConeSolver {
             for k in rows.clone() {
                 self.u[k] = self.center[k] - (problem.g[k] + self.Wz[k]) / self.R[i];
             }
-            let force = cone::project(spatial(&self.u[rows.clone()]), problem.friction[i]).force;
+            let force = cone::project(spatial(&self.u[rows.clone()]), problem.laws[i]).force;
             self.gamma[rows.clone()].copy_from_slice(&force[..rows.len()]);
         }
     }
@@ -321,7 +317,7 @@ impl ConeSolver {
                 for (n, k) in rows.clone().enumerate() {
                     u[n] = self.u[k] - t * Wdz[k] / self.R[i];
                 }
-                let force = cone::project(u, problem.friction[i]).force;
+                let force = cone::project(u, problem.laws[i]).force;
                 for (n, k) in rows.enumerate() {
                     sum += Wdz[k] * (z[k] + t * dz[k] - force[n]);
                 }

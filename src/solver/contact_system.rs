@@ -6,8 +6,8 @@
 use super::body_problem::BodyProblem;
 use super::cone_newton::{ConeProblem, ConeSolver, ConeTolerance, ConeWork};
 use super::factor_cache::{FactorCache, SystemFactor};
-use super::partner::{Partner, Reaction};
-use crate::contact::{Row, Side};
+use super::partner::{Partner, Partners, Reaction};
+use crate::contact::{Law, Row, Side};
 use crate::math::{Mat3, Vec3};
 
 /// Contacts of the bodies of one island.
@@ -49,7 +49,7 @@ impl Ingredients {
         rows: &[Row],
         bodies: &[BodyProblem],
         factors: &FactorCache,
-        partners: &[Partner],
+        partners: &Partners,
         h: f64,
     ) {
         self.bits.clear();
@@ -61,11 +61,15 @@ impl Ingredients {
         self.factors.clear();
         self.factors.extend(bodies.iter().map(|b| factors.get(b.factor).serial));
         self.bits.push(h);
+        for articulation in &partners.articulations {
+            self.bits.extend(articulation.blocks.iter().flat_map(|b| b.iter()));
+        }
         for body in bodies {
             self.bits.push(body.scaling);
             self.bits.extend(body.metric.floating_frame().iter());
         }
         for row in rows {
+            self.bits.push(row.compliance);
             self.bits.extend(row.directions().iter().flat_map(|d| d.iter()));
             for side in &row.sides {
                 match side {
@@ -76,14 +80,27 @@ impl Ingredients {
                     }
                     Side::Partner { partner, point } => {
                         self.nodes.push(partner.0);
-                        if let Partner::Rigid { com, inv_mass, inv_inertia, .. } =
-                            &partners[partner.0 as usize]
-                        {
-                            self.bits.extend(point.iter().chain(com).chain(inv_mass).chain(inv_inertia));
-                        }
+                        self.bits.extend(point.iter());
+                        self.describe_partner(partners.get(*partner));
+                    }
+                    Side::Turn { partner } => {
+                        self.nodes.push(partner.0);
+                        self.describe_partner(partners.get(*partner));
                     }
                 }
             }
+        }
+    }
+}
+
+impl Ingredients {
+    fn describe_partner(&mut self, partner: &Partner) {
+        match partner {
+            Partner::Prescribed { .. } => {}
+            Partner::Rigid { com, inv_mass, inv_inertia, .. } => {
+                self.bits.extend(com.iter().chain(inv_mass).chain(inv_inertia));
+            }
+            Partner::Link { com, .. } => self.bits.extend(com.iter()),
         }
     }
 }
@@ -108,16 +125,10 @@ impl ContactSystem {
     }
 
     /// Packs the rows for a step of `h` \[s\], with their warm starts, which are laid on the nodes.
-    pub fn begin(
-        &mut self,
-        bodies: &mut [BodyProblem],
-        partners: &[Partner],
-        h: f64,
-        limits: &ContactLimits,
-    ) {
+    pub fn begin(&mut self, bodies: &mut [BodyProblem], partners: &Partners, h: f64, limits: &ContactLimits) {
         self.problem.offsets.clear();
         self.problem.offsets.push(0);
-        self.problem.friction.clear();
+        self.problem.laws.clear();
         self.lambda.clear();
         self.shift.clear();
         self.goals.clear();
@@ -125,7 +136,7 @@ impl ContactSystem {
             self.lambda.extend(row.directions().iter().map(|d| d.dot(&row.warm_force)));
             self.shift.push(row.warm_shift_rate * h);
             self.problem.offsets.push(self.lambda.len());
-            self.problem.friction.push(row.friction);
+            self.problem.laws.push(row.law);
             self.goals.push(goal(row, bodies, partners, h, limits));
         }
         self.lay_forces(bodies);
@@ -133,7 +144,7 @@ impl ContactSystem {
 
     /// Assembles W for the current frames and scalings of the bodies, unless the last one was made of
     /// the same bits: so it is at rest.
-    pub fn assemble(&mut self, bodies: &[BodyProblem], factors: &FactorCache, partners: &[Partner], h: f64) {
+    pub fn assemble(&mut self, bodies: &[BodyProblem], factors: &FactorCache, partners: &Partners, h: f64) {
         let mut made_from = std::mem::take(&mut self.fresh);
         made_from.describe(&self.rows, bodies, factors, partners, h);
         if made_from.comparable && made_from == self.made_from {
@@ -158,6 +169,9 @@ impl ContactSystem {
                 }
             }
         }
+        for (i, row) in self.rows.iter().enumerate() {
+            W[offsets[i] * m + offsets[i]] += row.compliance;
+        }
         self.problem.W = W;
         self.problem.version += 1;
         self.problem.multiply(&self.lambda, &mut self.slips);
@@ -174,12 +188,12 @@ impl ContactSystem {
     pub fn solve(
         &mut self,
         bodies: &mut [BodyProblem],
-        partners: &[Partner],
+        partners: &Partners,
         h: f64,
         tolerance: ConeTolerance,
     ) -> (ConeWork, bool) {
         self.reactions.clear();
-        self.reactions.resize(partners.len(), Reaction::default());
+        self.reactions.resize(partners.list.len(), Reaction::default());
         let mut reactions = std::mem::take(&mut self.reactions);
         self.add_reactions(partners, h, &mut reactions);
         self.g_free.clear();
@@ -194,7 +208,7 @@ impl ContactSystem {
         self.reactions = reactions;
         self.before.clone_from(&self.lambda);
         let mut work = ConeWork::default();
-        let slides = self.problem.friction.iter().any(|mu| *mu > 0.0);
+        let slides = self.rows.iter().any(|row| row.dimension() == 3);
         for _ in 0..if slides { SHIFT_ROUNDS } else { 1 } {
             self.problem.g.clone_from(&self.g_free);
             for (i, shift) in self.shift.iter().enumerate() {
@@ -226,9 +240,12 @@ impl ContactSystem {
         for i in 0..self.rows.len() {
             let first = self.problem.offsets[i];
             self.shift[i] = 0.0;
-            if self.problem.offsets[i + 1] - first == 3 && self.lambda[first] > 0.0 {
+            if let Law::Contact { friction } = self.rows[i].law
+                && friction > 0.0
+                && self.lambda[first] > 0.0
+            {
                 let slip = |k: usize| self.g_free[first + k] + self.slips[first + k];
-                self.shift[i] = self.problem.friction[i] * slip(1).hypot(slip(2));
+                self.shift[i] = friction * slip(1).hypot(slip(2));
             }
         }
     }
@@ -261,27 +278,29 @@ impl ContactSystem {
     }
 
     /// Adds what the contacts do to the partners over the step.
-    pub fn add_reactions(&self, partners: &[Partner], h: f64, reactions: &mut [Reaction]) {
+    pub fn add_reactions(&self, partners: &Partners, h: f64, reactions: &mut [Reaction]) {
         for (i, row) in self.rows.iter().enumerate() {
             let force = self.force(i);
             if force == Vec3::zeros() {
                 continue;
             }
             for (side, sign) in row.sides.iter().zip([1.0, -1.0]) {
-                if let Side::Partner { partner, point } = side {
-                    let p = partner.0 as usize;
-                    partners[p].add_reaction(&mut reactions[p], point, &(force * sign), h);
-                }
+                partners.add_reaction(side, &(force * sign), h, reactions);
             }
         }
     }
 }
 
 /// What to add to the motion along the normal so that zero is the goal.
-fn goal(row: &Row, bodies: &[BodyProblem], partners: &[Partner], h: f64, limits: &ContactLimits) -> f64 {
+fn goal(row: &Row, bodies: &[BodyProblem], partners: &Partners, h: f64, limits: &ContactLimits) -> f64 {
+    if let Law::Held { .. } = row.law {
+        // What gives way is pulled back by its own force.
+        let fastest = if row.compliance > 0.0 { f64::INFINITY } else { limits.recovery_speed * h };
+        return row.gap.clamp(-fastest, fastest);
+    }
     let velocity = |side: &Side| match side {
         Side::Soft { body, .. } => side.interpolate(&bodies[*body].v_start),
-        Side::Partner { partner, point } => partners[partner.0 as usize].velocity(point, h),
+        _ => partners.velocity(side, h),
     };
     let approach = -row.frame[0].dot(&(velocity(&row.sides[0]) - velocity(&row.sides[1])));
     let hits = row.gap < approach * h;
@@ -298,7 +317,7 @@ fn goal(row: &Row, bodies: &[BodyProblem], partners: &[Partner], h: f64, limits:
 fn relative_motion(
     row: &Row,
     bodies: &[BodyProblem],
-    partners: &[Partner],
+    partners: &Partners,
     reactions: &[Reaction],
     h: f64,
 ) -> Vec3 {
@@ -308,10 +327,7 @@ fn relative_motion(
             let nodes = side.soft_nodes();
             nodes.fold(Vec3::zeros(), |sum, (n, w)| sum + (b.trial.x[n] - b.x_start[n]) * w)
         }
-        Side::Partner { partner, point } => {
-            let p = partner.0 as usize;
-            partners[p].free_displacement(point, h) + partners[p].displacement_by(&reactions[p], point, h)
-        }
+        _ => partners.displacement(side, reactions, h),
     };
     moved(&row.sides[0]) - moved(&row.sides[1])
 }
@@ -322,7 +338,7 @@ fn compliance(
     b: &Row,
     bodies: &[BodyProblem],
     factors: &FactorCache,
-    partners: &[Partner],
+    partners: &Partners,
     h: f64,
 ) -> Option<Mat3> {
     let mut sum = None;
@@ -332,13 +348,10 @@ fn compliance(
                 (Side::Soft { body: i, .. }, Side::Soft { body: j, .. }) if i == j => {
                     soft_compliance(side_a, side_b, a, b, &bodies[*i], factors.get(bodies[*i].factor))
                 }
-                (Side::Partner { partner: i, point: p }, Side::Partner { partner: j, point: q })
-                    if i == j && partners[i.0 as usize].yields() =>
-                {
-                    let partner = &partners[i.0 as usize];
-                    Mat3::from_fn(|r, c| partner.compliance(p, &a.frame[r], q, &b.frame[c], h))
-                }
-                _ => continue,
+                _ => match partners.compliance((side_a, &a.frame), (side_b, &b.frame), h) {
+                    Some(block) => block,
+                    None => continue,
+                },
             };
             *sum.get_or_insert(Mat3::zeros()) += term * (sign_a * sign_b);
         }

@@ -12,7 +12,7 @@ use super::contact_system::{ContactLimits, ContactSystem};
 use super::effort::{Effort, timed};
 use super::factor_cache::FactorCache;
 use super::lbfgs::Lbfgs;
-use super::partner::Partner;
+use super::partner::Partners;
 use crate::body::Acceleration;
 
 /// Bodies whose steps depend on one another.
@@ -52,7 +52,7 @@ pub(crate) const ROUNDING: f64 = 1.0e-12;
 impl Island {
     /// Does the iterations of a step of `h` \[s\]; results are in the bodies' `current` and in the
     /// contacts' forces.
-    pub fn solve(&mut self, factors: &FactorCache, partners: &[Partner], h: f64, limits: &ContactLimits) {
+    pub fn solve(&mut self, factors: &FactorCache, partners: &Partners, h: f64, limits: &ContactLimits) {
         self.report = IslandReport::default();
         for body in &mut self.bodies {
             body.choose_start(factors.get(body.factor));
@@ -95,7 +95,7 @@ impl Island {
     fn iterate(
         &mut self,
         factors: &FactorCache,
-        partners: &[Partner],
+        partners: &Partners,
         h: f64,
         limits: &ContactLimits,
     ) -> Outcome {
@@ -159,19 +159,13 @@ impl Island {
         outcome
     }
 
-    fn assemble_contacts(&mut self, factors: &FactorCache, partners: &[Partner], h: f64) {
+    fn assemble_contacts(&mut self, factors: &FactorCache, partners: &Partners, h: f64) {
         let (contacts, bodies) = (&mut self.contacts, &self.bodies);
         let time = &mut self.report.effort.contact_time;
         timed(time, || contacts.assemble(bodies, factors, partners, h));
     }
 
-    fn solve_contacts(
-        &mut self,
-        factors: &FactorCache,
-        partners: &[Partner],
-        h: f64,
-        limits: &ContactLimits,
-    ) {
+    fn solve_contacts(&mut self, factors: &FactorCache, partners: &Partners, h: f64, limits: &ContactLimits) {
         let heaviest = self.bodies.iter().map(|b| b.weight).fold(0.0, f64::max);
         let tolerance = ConeTolerance {
             relative: limits.tolerance,

@@ -24,5 +24,5 @@ pub(crate) use body_problem::BodyProblem;
 pub(crate) use contact_system::ContactLimits;
 pub(crate) use factor_cache::{FactorCache, FactorId};
 pub(crate) use island::{Island, IslandReport, ROUNDING};
-pub(crate) use partner::{Partner, Reaction};
+pub(crate) use partner::{Articulation, Partner, Partners, Reaction, Twist};
 pub(crate) use system::FactorKey;

@@ -1,6 +1,17 @@
-//! The rigid side of contacts: how a point of it moves over a step, and how it yields.
+//! The rigid side of contacts: how points of it move over a step, and how they yield.
 
-use crate::math::{Mat3, Pose64, Vec3};
+use crate::contact::{PartnerId, Side};
+use crate::math::{Mat3, Pose64, Vec3, rotation_vector};
+use nalgebra::{Matrix6, Vector6};
+
+/// Linear and angular part of a motion; the linear one is of the centre of mass.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Twist {
+    /// [m/s].
+    pub linear: Vec3,
+    /// [rad/s].
+    pub angular: Vec3,
+}
 
 /// A rigid body as the contact solve sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,16 +25,32 @@ pub(crate) enum Partner {
         inv_mass: Vec3,
         /// In the world [1/(kg m²)].
         inv_inertia: Mat3,
-        /// Velocities at the start of the step [m/s, rad/s].
-        linvel: Vec3,
-        angvel: Vec3,
-        /// Velocities at its end if nothing touched the body.
-        free_linvel: Vec3,
-        free_angvel: Vec3,
+        /// At the start of the step.
+        twist: Twist,
+        /// At its end if nothing touched the body.
+        free: Twist,
     },
+    /// A link of an articulation: yields with all its links.
+    Link { articulation: usize, slot: usize, com: Vec3, twist: Twist, free: Twist },
 }
 
-/// What the soft bodies do to a partner over a step.
+/// Links that are moved by each other's forces.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Articulation {
+    /// The links, by their slots.
+    pub links: Vec<PartnerId>,
+    /// `J_a M⁻¹ J_bᵀ` between slots a and b, row by row: twist per wrench.
+    pub blocks: Vec<Matrix6<f64>>,
+}
+
+/// All rigid things of a step.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Partners {
+    pub list: Vec<Partner>,
+    pub articulations: Vec<Articulation>,
+}
+
+/// What soft bodies do to a partner over a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Reaction {
     /// [N s].
@@ -34,63 +61,167 @@ pub(crate) struct Reaction {
 }
 
 impl Partner {
-    /// Displacement of the point `p` \[m\] over a step of `h` without contact.
-    pub fn free_displacement(&self, p: &Vec3, h: f64) -> Vec3 {
-        match self {
-            Self::Prescribed { start, end } => end.transform(&start.inverse_transform(p)) - p,
-            Self::Rigid { com, free_linvel, free_angvel, .. } => {
-                (free_linvel + free_angvel.cross(&(p - com))) * h
-            }
-        }
-    }
-
-    /// What a reaction adds to the displacement of the point `p` \[m\].
-    pub fn displacement_by(&self, reaction: &Reaction, p: &Vec3, h: f64) -> Vec3 {
+    fn com(&self) -> Vec3 {
         match self {
             Self::Prescribed { .. } => Vec3::zeros(),
-            Self::Rigid { com, inv_mass, inv_inertia, .. } => {
-                let angvel = inv_inertia * reaction.torque_impulse;
-                (inv_mass.component_mul(&reaction.impulse) + angvel.cross(&(p - com))) * h
-            }
+            Self::Rigid { com, .. } | Self::Link { com, .. } => *com,
         }
     }
 
-    /// Velocity of the point `p` at the start of the step [m/s].
-    pub fn velocity(&self, p: &Vec3, h: f64) -> Vec3 {
-        match self {
-            Self::Prescribed { .. } => self.free_displacement(p, h) / h,
-            Self::Rigid { com, linvel, angvel, .. } => linvel + angvel.cross(&(p - com)),
+    /// Force and moment about the centre of mass of a unit along `d` at a side.
+    fn wrench(&self, side: &Side, d: &Vec3) -> [Vec3; 2] {
+        match side {
+            Side::Partner { point, .. } => [*d, (point - self.com()).cross(d)],
+            Side::Turn { .. } | Side::Soft { .. } => [Vec3::zeros(), *d],
         }
     }
 
-    /// `h²·d_aᵀ J M⁻¹ Jᵀ d_b`: displacement \[m\] at point `p` along `a` per force \[N\] at `q` along `b`.
-    pub fn compliance(&self, p: &Vec3, a: &Vec3, q: &Vec3, b: &Vec3, h: f64) -> f64 {
-        match self {
-            Self::Prescribed { .. } => 0.0,
-            Self::Rigid { com, inv_mass, inv_inertia, .. } => {
-                let linear = a.dot(&inv_mass.component_mul(b));
-                let (arm_a, arm_b) = ((p - com).cross(a), (q - com).cross(b));
-                h * h * (linear + arm_a.dot(&(inv_inertia * arm_b)))
-            }
+    /// What a motion is at a side: of its point, or its turn.
+    fn at(&self, side: &Side, twist: &Twist) -> Vec3 {
+        match side {
+            Side::Partner { point, .. } => twist.linear + twist.angular.cross(&(point - self.com())),
+            Side::Turn { .. } | Side::Soft { .. } => twist.angular,
         }
     }
 
-    /// Whether forces move it.
-    pub fn yields(&self) -> bool {
+    fn yields(&self) -> bool {
         match self {
             Self::Prescribed { .. } => false,
             Self::Rigid { inv_mass, inv_inertia, .. } => {
                 *inv_mass != Vec3::zeros() || *inv_inertia != Mat3::zeros()
             }
+            Self::Link { .. } => true,
+        }
+    }
+}
+
+impl Partners {
+    pub fn clear(&mut self) {
+        self.list.clear();
+        self.articulations.clear();
+    }
+
+    pub fn get(&self, id: PartnerId) -> &Partner {
+        &self.list[id.0 as usize]
+    }
+
+    /// Takes in a partner.
+    pub fn push(&mut self, partner: Partner) -> PartnerId {
+        self.list.push(partner);
+        PartnerId(self.list.len() as u32 - 1)
+    }
+
+    /// Whether forces move it.
+    pub fn yields(&self, id: PartnerId) -> bool {
+        self.get(id).yields()
+    }
+
+    /// What yields with this partner: itself, or the first link of its articulation.
+    pub fn group(&self, id: PartnerId) -> PartnerId {
+        match self.get(id) {
+            Partner::Link { articulation, .. } => self.articulations[*articulation].links[0],
+            _ => id,
         }
     }
 
-    /// Adds a force \[N\] that acts over a step at the point `p`.
-    pub fn add_reaction(&self, reaction: &mut Reaction, p: &Vec3, force: &Vec3, h: f64) {
-        if let Self::Rigid { com, .. } = self {
-            reaction.touched = true;
-            reaction.impulse += force * h;
-            reaction.torque_impulse += (p - com).cross(force) * h;
+    /// How far a side moves over a step of `h` \[s\] under reactions \[m, rad\]; zero for a soft one.
+    pub fn displacement(&self, side: &Side, reactions: &[Reaction], h: f64) -> Vec3 {
+        let Some(id) = side.partner() else { return Vec3::zeros() };
+        let partner = self.get(id);
+        match partner {
+            Partner::Prescribed { start, end } => prescribed(side, start, end),
+            Partner::Rigid { inv_mass, inv_inertia, free, .. } => {
+                let reaction = &reactions[id.0 as usize];
+                let twist = Twist {
+                    linear: free.linear + inv_mass.component_mul(&reaction.impulse),
+                    angular: free.angular + inv_inertia * reaction.torque_impulse,
+                };
+                partner.at(side, &twist) * h
+            }
+            Partner::Link { articulation, slot, free, .. } => {
+                let Articulation { links, blocks } = &self.articulations[*articulation];
+                let mut sum = Vector6::zeros();
+                for (link, block) in links.iter().zip(&blocks[slot * links.len()..]) {
+                    let reaction = &reactions[link.0 as usize];
+                    sum += block * stacked(&[reaction.impulse, reaction.torque_impulse]);
+                }
+                let twist = Twist {
+                    linear: free.linear + sum.fixed_rows::<3>(0),
+                    angular: free.angular + sum.fixed_rows::<3>(3),
+                };
+                partner.at(side, &twist) * h
+            }
         }
     }
+
+    /// Velocity of a side at the start of the step [m/s, rad/s].
+    pub fn velocity(&self, side: &Side, h: f64) -> Vec3 {
+        let Some(id) = side.partner() else { return Vec3::zeros() };
+        let partner = self.get(id);
+        match partner {
+            Partner::Prescribed { start, end } => prescribed(side, start, end) / h,
+            Partner::Rigid { twist, .. } | Partner::Link { twist, .. } => partner.at(side, twist),
+        }
+    }
+
+    /// `h²·D_aᵀ J M⁻¹ Jᵀ D_b`: displacement at side `a` along its directions per force at side `b` along
+    /// its own; `None` if one does not move the other.
+    pub fn compliance(
+        &self,
+        (a, along_a): (&Side, &[Vec3; 3]),
+        (b, along_b): (&Side, &[Vec3; 3]),
+        h: f64,
+    ) -> Option<Mat3> {
+        let (i, j) = (a.partner()?, b.partner()?);
+        let (p, q) = (self.get(i), self.get(j));
+        let block = match (p, q) {
+            (Partner::Rigid { inv_mass, inv_inertia, .. }, Partner::Rigid { .. }) if i == j => {
+                if !p.yields() {
+                    return None;
+                }
+                let b = along_b.map(|d| q.wrench(b, &d));
+                let moved = b.map(|[f, m]| [inv_mass.component_mul(&f), inv_inertia * m]);
+                let a = along_a.map(|d| p.wrench(a, &d));
+                Mat3::from_fn(|r, c| a[r][0].dot(&moved[c][0]) + a[r][1].dot(&moved[c][1]))
+            }
+            (
+                Partner::Link { articulation, slot, .. },
+                Partner::Link { articulation: other, slot: from, .. },
+            ) if articulation == other => {
+                let Articulation { links, blocks } = &self.articulations[*articulation];
+                let C = &blocks[slot * links.len() + from];
+                let moved = along_b.map(|d| C * stacked(&q.wrench(b, &d)));
+                let a = along_a.map(|d| stacked(&p.wrench(a, &d)));
+                Mat3::from_fn(|r, c| a[r].dot(&moved[c]))
+            }
+            _ => return None,
+        };
+        Some(block * (h * h))
+    }
+
+    /// Adds a force \[N\] (or moment \[N m\]) that acts over a step at a side.
+    pub fn add_reaction(&self, side: &Side, force: &Vec3, h: f64, reactions: &mut [Reaction]) {
+        let Some(id) = side.partner() else { return };
+        let partner = self.get(id);
+        if partner.yields() {
+            let reaction = &mut reactions[id.0 as usize];
+            let [force, moment] = partner.wrench(side, force);
+            reaction.touched = true;
+            reaction.impulse += force * h;
+            reaction.torque_impulse += moment * h;
+        }
+    }
+}
+
+fn prescribed(side: &Side, start: &Pose64, end: &Pose64) -> Vec3 {
+    match side {
+        Side::Partner { point, .. } => end.transform(&start.inverse_transform(point)) - point,
+        Side::Turn { .. } | Side::Soft { .. } => {
+            rotation_vector(&(end.rotation * start.rotation.transpose()))
+        }
+    }
+}
+
+fn stacked([a, b]: &[Vec3; 2]) -> Vector6<f64> {
+    Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
 }
