@@ -65,3 +65,95 @@ fn a_light_plate_between_cube_and_floor_keeps_its_height() {
     assert!(height.abs() < 1e-4, "{height:e} m");
     assert!(speed < 1e-3, "{speed:e} m/s");
 }
+
+#[test]
+fn a_tower_of_soft_and_rigid_boxes_stands_still() {
+    let (mut physics, floor) = world_with_floor(H);
+    let mut world = DeformableWorld::new();
+    let (mut soft, mut rigid) = (Vec::new(), Vec::new());
+    for k in 0..10 {
+        let y = 0.2 + 0.4 * k as f32;
+        if k % 2 == 0 {
+            let material = DeformableMaterial::new(1e7, 0.3);
+            soft.push(world.insert(cube(material, y)).unwrap());
+        } else {
+            rigid.push(rigid_box(&mut physics, Vector::Y * y, Vector::splat(0.2), 64.0));
+        }
+    }
+    let start: Vec<Vector> = rigid.iter().map(|b| physics.bodies[*b].translation()).collect();
+    for _ in 0..1800 {
+        world.step(&mut physics);
+    }
+    let mut drift = 0.0f32;
+    for (b, from) in rigid.iter().zip(&start) {
+        let moved = physics.bodies[*b].translation() - from;
+        drift = drift.max(moved.x.hypot(moved.z));
+    }
+    println!("tower: drift {drift:.1e} m");
+    assert!(f64::from(drift) < 1e-3 * 0.4, "{drift:e} m");
+    for (k, body) in soft.iter().enumerate() {
+        let below = if k == 0 { floor } else { physics.bodies[rigid[k - 1]].colliders()[0] };
+        // The soft box itself and everything above it.
+        let above = (10 - 2 * k) as f64 * 64.0 * G;
+        let carried = f64::from(world.contact_force(*body, below).y) / above;
+        assert!((carried - 1.0).abs() < 1e-3, "interface {k}: {carried}");
+    }
+}
+
+/// A vertical pole on a revolute joint, horizontal axis z; a soft cube hangs nowhere near it.
+#[test]
+fn a_hinged_lid_presses_on_a_cube_with_its_moment() {
+    // A lid of 1 m hinged at x = −0.5 rests on a soft cube at x = 0.2: the cube carries
+    // m g·(0.5 / 0.7) if the hinge carries the rest.
+    let (mut physics, _) = world_with_floor(H);
+    let lid = rigid_box(&mut physics, Vector::new(0.0, 0.42, 0.0), Vector::new(0.5, 0.02, 0.1), 20.0);
+    let post = physics.insert_body(RigidBodyBuilder::fixed().translation(Vector::new(-0.5, 0.42, 0.0)));
+    let hinge = RevoluteJointBuilder::new(Vector::Z)
+        .local_anchor1(Vector::ZERO)
+        .local_anchor2(Vector::new(-0.5, 0.0, 0.0));
+    physics.impulse_joints.insert(post, lid, hinge, true);
+    let mut world = DeformableWorld::new();
+    let small = DeformableBodyBuilder::cuboid(Vector::new(0.05, 0.2, 0.05), [2, 6, 2])
+        .translation(Vector::new(0.2, 0.2, 0.0))
+        .material(DeformableMaterial::new(1e6, 0.3).friction(MU));
+    let body = world.insert(small).unwrap();
+    let speed = settle(&mut physics, &mut world, &[lid], 300);
+    let lid_collider = physics.bodies[lid].colliders()[0];
+    let force = -f64::from(world.contact_force(body, lid_collider).y);
+    // The lid sinks by a little: where the force acts on it, measured.
+    let moment: f64 = world
+        .contacts_with(lid_collider)
+        .map(|c| f64::from(-c.force.y) * (f64::from(c.point.x) + 0.5) + f64::from(c.force.x) * (f64::from(c.point.y) - 0.42))
+        .sum();
+    println!("hinged lid: {force} N, moment {moment} N m of {}, speed {speed:.1e}", 20.0 * G * 0.5);
+    assert!((moment / (20.0 * G * 0.5) - 1.0).abs() < 1e-2, "{moment} N m");
+    let hinge_gap = physics.bodies[lid].position().transform_point(Vector::new(-0.5, 0.0, 0.0))
+        - Vector::new(-0.5, 0.42, 0.0);
+    assert!(hinge_gap.length() < 1e-4 && speed < 1e-3, "{hinge_gap} {speed:e}");
+}
+
+#[test]
+fn a_motor_presses_with_its_greatest_force() {
+    // A piston on a prismatic joint pushes a soft cube against a wall with a limited motor.
+    let mut physics = PhysicsWorld::new();
+    physics.gravity = Vector::ZERO;
+    let wall = RigidBodyBuilder::fixed().translation(Vector::X * 0.7);
+    let (_, wall) = physics.insert(wall, ColliderBuilder::cuboid(0.5, 1.0, 1.0).friction(MU as f32));
+    let base = physics.insert_body(RigidBodyBuilder::fixed().translation(Vector::X * -1.0));
+    let piston = rigid_box(&mut physics, Vector::X * -0.31, Vector::splat(0.1), 2.0);
+    let slide = PrismaticJointBuilder::new(Vector::X)
+        .motor_model(MotorModel::ForceBased)
+        .motor_velocity(0.5, 1e4)
+        .motor_max_force(200.0);
+    let joint = physics.impulse_joints.insert(base, piston, slide, true);
+    let mut world = DeformableWorld::new();
+    let body = world.insert(cube(DeformableMaterial::new(1e6, 0.3), 0.0)).unwrap();
+    let speed = settle(&mut physics, &mut world, &[piston], 240);
+    let force = -f64::from(world.contact_force(body, wall).x);
+    println!("motor: {force} N on the wall, {speed:.1e} m/s");
+    assert!((force / 200.0 - 1.0).abs() < 1e-3, "{force} N");
+    assert!(speed < 1e-3);
+    // The user's motor is as it was.
+    let motor = physics.impulse_joints.get(joint).unwrap();
+    assert_eq!(motor.data.motor_axes, JointAxesMask::LIN_X);
+}

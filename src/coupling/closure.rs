@@ -5,13 +5,14 @@
 //! a walk, breadth first, from the touched bodies through dynamic ones. What these rows carry is handed
 //! to rapier with the rest, so that its own solver finds almost nothing left to do.
 
-use super::joint_rows::{JointEnds, joint_rows};
+use super::joint_rows::{JointEnds, drive_rows, joint_rows};
 use super::obstacles::RapierScene;
 use super::parts::RapierSets;
 use crate::body::ContactKey;
 use crate::contact::{Law, PartnerId, Row, Side};
 use crate::math::{Pose64, from_real};
-use rapier3d::dynamics::{ImpulseJointHandle, RigidBodyHandle};
+use crate::solver::Partner;
+use rapier3d::dynamics::{ImpulseJointHandle, MultibodyIndex, RigidBodyHandle};
 use rapier3d::geometry::{ColliderHandle, ContactManifold, ContactPair, SolverFlags};
 use rapier3d::math::Vector;
 use std::collections::HashSet;
@@ -22,6 +23,9 @@ pub(crate) struct Closure {
     pub rows: Vec<Row>,
     /// Impulse joints whose motors this step drives.
     pub driven: Vec<ImpulseJointHandle>,
+    /// Multibody links whose joints' motors this step drives.
+    pub driven_links: Vec<(MultibodyIndex, usize)>,
+    articulations: HashSet<usize>,
     queue: Vec<RigidBodyHandle>,
     reached: HashSet<RigidBodyHandle>,
     done: HashSet<RigidBodyHandle>,
@@ -31,6 +35,8 @@ pub(crate) struct Closure {
 const CONTACT_SLOT: u32 = u32::MAX;
 /// As [`CONTACT_SLOT`].
 const JOINT_SLOT: u32 = u32::MAX - 1;
+/// As [`CONTACT_SLOT`], of the joints of multibodies.
+const LINK_SLOT: u32 = u32::MAX - 2;
 /// Points of a manifold that keys tell apart.
 const POINTS: u32 = 1 << 16;
 
@@ -47,6 +53,8 @@ impl Closure {
     ) {
         self.rows.clear();
         self.driven.clear();
+        self.driven_links.clear();
+        self.articulations.clear();
         self.queue.clear();
         self.reached.clear();
         self.done.clear();
@@ -63,6 +71,7 @@ impl Closure {
             next += 1;
             self.take_contacts(handle, scene, sets, gravity, dt, limit);
             self.take_joints(handle, scene, sets, gravity, dt, limit);
+            self.take_articulation(handle, scene, sets, gravity, dt, limit);
             self.done.insert(handle);
         }
         self.rows.sort_unstable_by_key(|row| row.key);
@@ -133,6 +142,49 @@ impl Closure {
             }
             self.reach(scene, first, limit);
             self.reach(scene, second, limit);
+        }
+    }
+}
+
+impl Closure {
+    /// Limits and motors of the whole multibody that a link belongs to.
+    fn take_articulation(
+        &mut self,
+        handle: RigidBodyHandle,
+        scene: &mut RapierScene,
+        sets: RapierSets<'_>,
+        gravity: Vector,
+        dt: f64,
+        limit: usize,
+    ) {
+        let partner = scene.body_partner(sets, handle, gravity, dt).map(|id| *scene.partners.get(id));
+        let Some(Partner::Link { articulation, .. }) = partner else { return };
+        if !self.articulations.insert(articulation) {
+            return;
+        }
+        for id in scene.partners.articulations[articulation].links.clone() {
+            self.reach(scene, id, limit);
+        }
+        let index = scene.articulated[articulation].multibody;
+        let Some(multibody) = sets.multibody_joints.get_multibody(index) else { return };
+        for link in multibody.links() {
+            let Some(parent) = link.parent_id().and_then(|id| multibody.link(id)) else { continue };
+            let handles = [parent.rigid_body_handle(), link.rigid_body_handle()];
+            let ends = handles.map(|b| scene.body_partner(sets, b, gravity, dt));
+            let poses = handles.map(|b| sets.bodies.get(b).map(|b| Pose64::from_real(b.position())));
+            let ([Some(first), Some(second)], [Some(pose1), Some(pose2)]) = (ends, poses) else { continue };
+            let (body, generation) = handles[1].into_raw_parts();
+            let key = ContactKey {
+                obstacle: u64::from(body) << 32 | u64::from(generation),
+                part: 0,
+                feature: 0,
+                slot: LINK_SLOT,
+            };
+            let ends = JointEnds { partners: [first, second], poses: [pose1, pose2] };
+            drive_rows(&link.joint.data, &ends, &scene.partners, dt, key, &mut self.rows);
+            if !link.joint.data.motor_axes.is_empty() {
+                self.driven_links.push((index, link.link_id()));
+            }
         }
     }
 }

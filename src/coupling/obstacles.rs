@@ -1,5 +1,6 @@
 //! Colliders and rigid bodies as obstacles and partners.
 
+use super::articulations::{ArticulatedLinks, read_articulation};
 use super::parts::RapierSets;
 use crate::body::DeformableBody;
 use crate::contact::{Obstacle, PartnerId};
@@ -23,6 +24,7 @@ pub(crate) struct RapierScene {
     pub handles: Vec<Option<RigidBodyHandle>>,
     /// Collider of each obstacle.
     pub colliders: Vec<ColliderHandle>,
+    pub(super) articulated: Vec<ArticulatedLinks>,
     partner_of_body: HashMap<RigidBodyHandle, PartnerId>,
     /// Heightfields as triangle meshes, which project points faster. The field is kept too, so
     /// that its address stays its own.
@@ -38,6 +40,7 @@ impl RapierScene {
         self.partners.clear();
         self.handles.clear();
         self.colliders.clear();
+        self.articulated.clear();
         self.partner_of_body.clear();
         self.seen.clear();
         for (handle, collider) in sets.colliders.iter() {
@@ -113,7 +116,18 @@ impl RapierScene {
         if let Some(id) = self.partner_of_body.get(&handle) {
             return *id;
         }
-        let partner = partner_of(sets, handle, body, gravity, dt);
+        if let Some(link) = sets.multibody_joints.rigid_body_link(handle)
+            && body.is_dynamic()
+            && read_articulation(self, sets, link.multibody, gravity, dt)
+            && let Some(id) = self.partner_of_body.get(&handle)
+        {
+            return *id;
+        }
+        self.take_in(partner_of(sets, handle, body, gravity, dt), handle)
+    }
+
+    /// Takes in the partner of a body.
+    pub(super) fn take_in(&mut self, partner: Partner, handle: RigidBodyHandle) -> PartnerId {
         let id = self.push_partner(partner, Some(handle));
         self.partner_of_body.insert(handle, id);
         id
@@ -208,7 +222,7 @@ fn partner_of(
         RigidBodyType::KinematicVelocityBased => {
             prescribed(Pose64::from_real(&body.predict_position_using_velocity(dt as f32)))
         }
-        // A link's own velocity is not its to change: it carries the soft body as a kinematic one.
+        // A link that cannot be read as part of an articulation carries soft bodies as a kinematic one.
         _ if sets.multibody_joints.rigid_body_link(handle).is_some() => {
             prescribed(Pose64::from_real(&body.predict_position_using_velocity(dt as f32)))
         }

@@ -4,12 +4,13 @@
 //! it gets the *impulse* h·(f_ext + reaction) and the *force* −f_ext for the coming step: its substeps
 //! then find nothing to accelerate it. The user's force is put back afterwards.
 
+use super::articulations::write_articulations;
 use super::closure::Closure;
 use super::obstacles::{RapierScene, current_mass_properties, external_force};
 use super::parts::PhysicsParts;
 use crate::math::{from_real, to_real};
 use crate::solver::{Partner, Reaction};
-use rapier3d::dynamics::{ImpulseJointHandle, JointAxesMask, RigidBodyHandle};
+use rapier3d::dynamics::{ImpulseJointHandle, JointAxesMask, MultibodyIndex, RigidBody, RigidBodyHandle};
 use rapier3d::math::Vector;
 
 /// Forces that were replaced for the duration of rapier's step.
@@ -18,6 +19,8 @@ pub(crate) struct Reactions {
     replaced: Vec<Replaced>,
     /// Motors that rest during rapier's step.
     stilled: Vec<(ImpulseJointHandle, JointAxesMask)>,
+    stilled_links: Vec<(MultibodyIndex, usize, JointAxesMask)>,
+    touched_links: Vec<RigidBodyHandle>,
 }
 
 struct Replaced {
@@ -42,6 +45,7 @@ impl Reactions {
     ) {
         self.replaced.clear();
         self.write_bodies(parts, scene, reactions);
+        self.write_links(parts, scene, reactions);
         self.still_motors(parts, closure);
     }
 
@@ -54,11 +58,10 @@ impl Reactions {
             };
             let Some(body) = bodies.get(handle).filter(|_| reaction.touched) else { continue };
             let masses = current_mass_properties(colliders, body);
-            let (force, torque) = (body.user_force(), body.user_torque());
             let external = external_force(body, &masses, gravity);
             let h = f64::from(dt);
             let impulse = reaction.impulse + from_real(external) * h;
-            let torque_impulse = reaction.torque_impulse + from_real(torque) * h;
+            let torque_impulse = reaction.torque_impulse + from_real(body.user_torque()) * h;
             let linvel = to_real(&(from_real(body.linvel()) + inv_mass.component_mul(&impulse)));
             let angvel = to_real(&(from_real(body.angvel()) + inv_inertia * torque_impulse));
             // A reaction that f32 cannot hold would put NaN into the user's world.
@@ -68,16 +71,21 @@ impl Reactions {
             let Some(body) = bodies.get_mut(handle) else { continue };
             body.set_linvel(linvel, true);
             body.set_angvel(angvel, true);
-            body.add_force(-external, true);
-            body.add_torque(-torque, true);
-            self.replaced.push(Replaced {
-                handle,
-                force,
-                torque,
-                set_force: body.user_force(),
-                set_torque: body.user_torque(),
-            });
+            self.replaced.push(rest_forces(handle, body, external));
         }
+    }
+
+    fn write_links(&mut self, parts: &mut PhysicsParts<'_>, scene: &RapierScene, reactions: &[Reaction]) {
+        let mut touched = std::mem::take(&mut self.touched_links);
+        write_articulations(parts, scene, reactions, &mut touched);
+        for handle in touched.drain(..) {
+            let Some(body) = parts.bodies.get(handle) else { continue };
+            let masses = current_mass_properties(parts.colliders, body);
+            let external = external_force(body, &masses, parts.gravity);
+            let Some(body) = parts.bodies.get_mut(handle) else { continue };
+            self.replaced.push(rest_forces(handle, body, external));
+        }
+        self.touched_links = touched;
     }
 
     /// Motors that were solved here rest in rapier's step, or they would act twice.
@@ -88,6 +96,13 @@ impl Reactions {
             self.stilled.push((handle, joint.data.motor_axes));
             joint.data.motor_axes = JointAxesMask::empty();
         }
+        self.stilled_links.clear();
+        for &(multibody, link) in &closure.driven_links {
+            let multibody_mut = parts.multibody_joints.get_multibody_mut(multibody);
+            let Some(joint) = multibody_mut.and_then(|m| m.link_mut(link)) else { continue };
+            self.stilled_links.push((multibody, link, joint.joint.data.motor_axes));
+            joint.joint.data.motor_axes = JointAxesMask::empty();
+        }
     }
 
     /// Puts the users' forces and motors back after rapier's step; forces that its callbacks have added in
@@ -96,6 +111,12 @@ impl Reactions {
         for (handle, axes) in self.stilled.drain(..) {
             if let Some(joint) = parts.impulse_joints.get_mut(handle, false) {
                 joint.data.motor_axes |= axes;
+            }
+        }
+        for (multibody, link, axes) in self.stilled_links.drain(..) {
+            let multibody = parts.multibody_joints.get_multibody_mut(multibody);
+            if let Some(link) = multibody.and_then(|m| m.link_mut(link)) {
+                link.joint.data.motor_axes |= axes;
             }
         }
         let bodies = &mut *parts.bodies;
@@ -115,4 +136,12 @@ impl Reactions {
             body.add_torque(torque, false);
         }
     }
+}
+
+/// Cancels the external forces on a body, which have been handed to it as an impulse.
+fn rest_forces(handle: RigidBodyHandle, body: &mut RigidBody, external: Vector) -> Replaced {
+    let (force, torque) = (body.user_force(), body.user_torque());
+    body.add_force(-external, true);
+    body.add_torque(-torque, true);
+    Replaced { handle, force, torque, set_force: body.user_force(), set_torque: body.user_torque() }
 }

@@ -1,0 +1,129 @@
+//! Multibodies as articulations: links that yield together by the inverse of their mass matrix.
+//!
+//! Rapier moves a link by its generalized velocities only: what we do to links is handed over as
+//! `v += M⁻¹ Σ Jᵀp`; an impulse on the link's body would be lost.
+
+use super::obstacles::{RapierScene, current_mass_properties, external_force};
+use super::parts::{PhysicsParts, RapierSets};
+use crate::contact::PartnerId;
+use crate::math::{Vec3, from_real};
+use crate::solver::{Articulation, Partner, Reaction, Twist};
+use nalgebra::{DMatrix, Matrix6, Vector6};
+use rapier3d::dynamics::{Multibody, MultibodyIndex, RigidBodyHandle};
+use rapier3d::math::Vector;
+
+/// The links of a multibody in one step.
+pub(super) struct ArticulatedLinks {
+    pub multibody: MultibodyIndex,
+    /// Number within the multibody, and body, by slot.
+    pub links: Vec<(usize, RigidBodyHandle)>,
+}
+
+/// Takes in all dynamic links of a multibody; false if rapier has not computed its mass matrix yet, or
+/// some of its joints are kinematic, of which the order of coordinates is not known.
+pub(super) fn read_articulation(
+    scene: &mut RapierScene,
+    sets: RapierSets<'_>,
+    index: MultibodyIndex,
+    gravity: Vector,
+    dt: f64,
+) -> bool {
+    let Some(multibody) = sets.multibody_joints.get_multibody(index) else { return false };
+    let dofs = multibody.ndofs();
+    if dofs == 0 || multibody.inv_augmented_mass().lu_internal().nrows() != dofs {
+        return false;
+    }
+    let dynamic = |handle: RigidBodyHandle| sets.bodies.get(handle).is_some_and(|b| b.is_dynamic());
+    let links = multibody.links().map(|link| (link.link_id(), link.rigid_body_handle()));
+    let links: Vec<(usize, RigidBodyHandle)> = links.filter(|(_, handle)| dynamic(*handle)).collect();
+    let jacobians = links.iter().map(|(id, _)| multibody.body_jacobian(*id));
+    if links.is_empty() || jacobians.clone().any(|J| J.ncols() != dofs) {
+        return false;
+    }
+    let blocks = compliances(multibody, &links);
+    let count = links.len();
+    let number = scene.partners.articulations.len();
+    let forces: Vec<Vector6<f64>> = links.iter().map(|(_, h)| external_wrench(sets, *h, gravity)).collect();
+    let mut partners = Vec::with_capacity(count);
+    for (slot, &(_, handle)) in links.iter().enumerate() {
+        let Some(body) = sets.bodies.get(handle) else { return false };
+        let mut gain = Vector6::zeros();
+        for (other, force) in forces.iter().enumerate() {
+            gain += blocks[slot * count + other] * force * dt;
+        }
+        let twist = Twist { linear: from_real(body.linvel()), angular: from_real(body.angvel()) };
+        let free = Twist {
+            linear: twist.linear + gain.fixed_rows::<3>(0),
+            angular: twist.angular + gain.fixed_rows::<3>(3),
+        };
+        let com = from_real(current_mass_properties(sets.colliders, body).world_com);
+        let partner = Partner::Link { articulation: number, slot, com, twist, free };
+        partners.push(scene.take_in(partner, handle));
+    }
+    scene.partners.articulations.push(Articulation { links: partners, blocks });
+    scene.articulated.push(ArticulatedLinks { multibody: index, links });
+    true
+}
+
+/// `J_a M⁻¹ J_bᵀ` of all pairs of links, made symmetric: rapier's matrices are in single precision.
+fn compliances(multibody: &Multibody, links: &[(usize, RigidBodyHandle)]) -> Vec<Matrix6<f64>> {
+    let count = links.len();
+    let J = |slot: usize| multibody.body_jacobian(links[slot].0);
+    let moved: Vec<Option<DMatrix<f32>>> = (0..count)
+        .map(|b| multibody.inv_augmented_mass().solve(&DMatrix::from_fn(J(b).ncols(), 6, |i, j| J(b)[(j, i)])))
+        .collect();
+    let block = |a: usize, b: usize| {
+        let Some(moved) = &moved[b] else { return Matrix6::zeros() };
+        let product = J(a) * moved;
+        Matrix6::from_fn(|r, c| f64::from(product[(r, c)]))
+    };
+    let mut blocks = Vec::with_capacity(count * count);
+    for a in 0..count {
+        for b in 0..count {
+            blocks.push((block(a, b) + block(b, a).transpose()) * 0.5);
+        }
+    }
+    blocks
+}
+
+fn external_wrench(sets: RapierSets<'_>, handle: RigidBodyHandle, gravity: Vector) -> Vector6<f64> {
+    let Some(body) = sets.bodies.get(handle) else { return Vector6::zeros() };
+    let masses = current_mass_properties(sets.colliders, body);
+    let force = from_real(external_force(body, &masses, gravity));
+    let torque = from_real(body.user_torque());
+    Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
+}
+
+/// Changes the generalized velocities of touched articulations by the reactions on their links, and by
+/// what external forces do over the step; hands out the bodies whose forces have to rest for it.
+pub(super) fn write_articulations(
+    parts: &mut PhysicsParts<'_>,
+    scene: &RapierScene,
+    reactions: &[Reaction],
+    touched: &mut Vec<RigidBodyHandle>,
+) {
+    let dt = f64::from(parts.dt);
+    for (articulation, read) in scene.partners.articulations.iter().zip(&scene.articulated) {
+        let of = |id: &PartnerId| &reactions[id.0 as usize];
+        if !articulation.links.iter().any(|id| of(id).touched) {
+            continue;
+        }
+        let wrenches = articulation.links.iter().zip(&read.links).map(|(id, (_, handle))| {
+            let external = external_wrench(parts.sets(), *handle, parts.gravity) * dt;
+            let (p, l): (Vec3, Vec3) = (of(id).impulse, of(id).torque_impulse);
+            Vector6::new(p.x, p.y, p.z, l.x, l.y, l.z) + external
+        });
+        let wrenches: Vec<Vector6<f64>> = wrenches.collect();
+        let Some(multibody) = parts.multibody_joints.get_multibody_mut(read.multibody) else { continue };
+        let mut impulse = nalgebra::DVector::<f32>::zeros(multibody.ndofs());
+        for ((link, _), wrench) in read.links.iter().zip(&wrenches) {
+            impulse += multibody.body_jacobian(*link).tr_mul(&wrench.map(|w| w as f32));
+        }
+        let Some(change) = multibody.inv_augmented_mass().solve(&impulse) else { continue };
+        if change.iter().all(|c| c.is_finite()) {
+            let mut velocity = multibody.generalized_velocity_mut();
+            velocity += &change;
+            touched.extend(read.links.iter().map(|(_, handle)| *handle));
+        }
+    }
+}
