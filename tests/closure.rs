@@ -123,7 +123,10 @@ fn a_hinged_lid_presses_on_a_cube_with_its_moment() {
     // The lid sinks by a little: where the force acts on it, measured.
     let moment: f64 = world
         .contacts_with(lid_collider)
-        .map(|c| f64::from(-c.force.y) * (f64::from(c.point.x) + 0.5) + f64::from(c.force.x) * (f64::from(c.point.y) - 0.42))
+        .map(|c| {
+            f64::from(-c.force.y) * (f64::from(c.point.x) + 0.5)
+                + f64::from(c.force.x) * (f64::from(c.point.y) - 0.42)
+        })
         .sum();
     println!("hinged lid: {force} N, moment {moment} N m of {}, speed {speed:.1e}", 20.0 * G * 0.5);
     assert!((moment / (20.0 * G * 0.5) - 1.0).abs() < 1e-2, "{moment} N m");

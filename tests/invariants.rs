@@ -209,3 +209,22 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_falling_body_has_its_columns_before_it_lands() {
+    // 49 nodes of the lower face, eight a step, on a fall of 24 steps.
+    let (mut physics, _) = world_with_floor(1.0 / 60.0);
+    let mut world = DeformableWorld::new();
+    world.insert(cube(DeformableMaterial::new(1e6, 0.3), 1.0)).unwrap();
+    let mut landed = false;
+    for _ in 0..30 {
+        world.step(&mut physics);
+        let counters = world.counters();
+        assert!(counters.columns <= 8, "{} columns in one step", counters.columns);
+        if counters.contacts > 0 && !landed {
+            landed = true;
+            assert_eq!(counters.columns, 0);
+        }
+    }
+    assert!(landed);
+}

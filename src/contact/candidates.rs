@@ -2,8 +2,10 @@
 //! what moves.
 
 use super::Obstacle;
+use crate::math::{Vec3, to_real};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::partitioning::{Bvh, BvhBuildStrategy};
+use parry3d::query::PointQuery;
 
 /// The broad phase over the obstacles of a step. The tree is kept while nothing in it changes.
 #[derive(Default)]
@@ -36,6 +38,31 @@ impl Candidates {
         }
     }
 
+    /// Orders points by their distance from the obstacles whose boxes they would meet if all were shifted;
+    /// no points if there are none such. `found` is memory for the obstacles.
+    pub fn on_the_way(
+        &self,
+        obstacles: &[Obstacle],
+        points: impl Iterator<Item = Vec3> + Clone,
+        shift: &Vec3,
+        found: &mut Vec<u32>,
+        order: &mut Vec<(f32, u32)>,
+    ) {
+        order.clear();
+        let here = Aabb::from_points(points.clone().map(|p| to_real(&p)));
+        self.near(&here.merged(&here.translated(to_real(shift))), found);
+        if found.is_empty() {
+            return;
+        }
+        let boxes = found.iter().map(|&o| obstacles[o as usize].swept_aabb());
+        let distance = |p: &Vec3| {
+            let distances = boxes.clone().map(|b| b.distance_to_local_point(to_real(p), true));
+            distances.fold(f32::INFINITY, f32::min)
+        };
+        order.extend((0u32..).zip(points).map(|(k, p)| (distance(&p), k)));
+        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    }
+
     /// Obstacles whose boxes meet `aabb`, ascending.
     pub fn near(&self, aabb: &Aabb, found: &mut Vec<u32>) {
         found.clear();
@@ -55,7 +82,7 @@ impl Candidates {
 mod tests {
     use super::*;
     use crate::contact::PartnerId;
-    use crate::math::{Mat3, Pose64, Vec3};
+    use crate::math::{Mat3, Pose64};
     use parry3d::math::Vector;
     use parry3d::shape::SharedShape;
     use proptest::prelude::*;

@@ -70,7 +70,9 @@ fn compliances(multibody: &Multibody, links: &[(usize, RigidBodyHandle)]) -> Vec
     let count = links.len();
     let J = |slot: usize| multibody.body_jacobian(links[slot].0);
     let moved: Vec<Option<DMatrix<f32>>> = (0..count)
-        .map(|b| multibody.inv_augmented_mass().solve(&DMatrix::from_fn(J(b).ncols(), 6, |i, j| J(b)[(j, i)])))
+        .map(|b| {
+            multibody.inv_augmented_mass().solve(&DMatrix::from_fn(J(b).ncols(), 6, |i, j| J(b)[(j, i)]))
+        })
         .collect();
     let block = |a: usize, b: usize| {
         let Some(moved) = &moved[b] else { return Matrix6::zeros() };

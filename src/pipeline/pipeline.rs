@@ -146,6 +146,7 @@ impl DeformablePipeline {
         for_each(&mut self.works, |work| {
             let body = &deformables[work.handle];
             work.detect(body, scene, candidates, sets);
+            work.look_ahead(body, scene, candidates);
         });
         self.counters.pairs = self.works.iter().map(|w| w.pairs).sum();
         self.counters.contacts = self.works.iter().map(|w| w.rows.len()).sum();
@@ -163,9 +164,9 @@ impl DeformablePipeline {
                 quarantine(body, counters);
                 return false;
             };
-            work.set_factor(done.id);
             counters.factorizations += done.factorizations;
-            counters.columns += done.columns;
+            counters.columns += done.columns + factors.prepare_ahead(done.id, &problem.key.pins, &work.ahead);
+            work.set_factor(done.id);
             true
         });
         self.counters.factor_bytes = self.factors.factor_bytes();

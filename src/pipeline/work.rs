@@ -17,7 +17,13 @@ pub(super) struct BodyWork {
     pub pairs: usize,
     detector: Detector,
     near: Vec<u32>,
+    /// Surface nodes in the order in which they are expected to touch.
+    pub ahead: Vec<u32>,
+    distances: Vec<(f32, u32)>,
 }
+
+/// How far a body that touches nothing looks ahead \[s\].
+const LOOK_AHEAD: f64 = 0.5;
 
 impl BodyWork {
     pub fn new(handle: DeformableBodyHandle) -> Self {
@@ -29,6 +35,8 @@ impl BodyWork {
             pairs: 0,
             detector: Detector::default(),
             near: Vec::new(),
+            ahead: Vec::new(),
+            distances: Vec::new(),
         }
     }
 
@@ -77,6 +85,19 @@ impl BodyWork {
             !held || row.sides.iter().any(yields)
         });
         self.rows.sort_unstable_by_key(|row| row.key);
+    }
+
+    /// Looks for obstacles that a body that touches nothing yet is about to meet, and lists its surface
+    /// nodes by their distance from those.
+    pub fn look_ahead(&mut self, body: &DeformableBody, scene: &RapierScene, candidates: &Candidates) {
+        self.ahead.clear();
+        let Some(problem) = self.problem.as_ref().filter(|_| self.rows.is_empty()) else { return };
+        let x = &problem.x_start;
+        let mean = body.state.v.iter().sum::<Vec3>() / x.len() as f64;
+        let points = problem.model.surface.nodes.iter().map(|&n| x[n as usize]);
+        let shift = mean * LOOK_AHEAD;
+        candidates.on_the_way(&scene.obstacles, points, &shift, &mut self.near, &mut self.distances);
+        self.ahead.extend(self.distances.iter().map(|(_, s)| *s));
     }
 
     /// Tells where the body's factor is kept in this step.

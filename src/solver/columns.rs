@@ -24,6 +24,11 @@ impl Columns {
         Self { d: dimension(system), columns: vec![None; surface.nodes.len()], made: 0 }
     }
 
+    /// Whether a surface node has its columns.
+    pub fn has(&self, surface_node: u32) -> bool {
+        self.columns[surface_node as usize].is_some()
+    }
+
     /// Makes the columns at these surface nodes (indices into `Surface::nodes`) that are not there
     /// yet; returns how many nodes that were.
     pub fn prepare(
@@ -38,6 +43,9 @@ impl Columns {
         let mut missing: Vec<u32> = surface_nodes.filter(|&s| self.columns[s as usize].is_none()).collect();
         missing.sort_unstable();
         missing.dedup();
+        if missing.is_empty() {
+            return 0;
+        }
         let (d, nodes) = (self.d, &model.surface.nodes);
         let n = d * model.rest.len();
         let mut batch = Vec::new();

@@ -4,7 +4,7 @@
 //! an old one; it only takes longer.
 
 use super::columns::Columns;
-use super::factor::{Factor, FactorScratch, Symbolic};
+use super::factor::{BATCH, Factor, FactorScratch, Symbolic};
 use super::system::{self, FactorKey};
 use crate::body::{DeformableBody, DeformableModel, SystemMatrix};
 use std::collections::HashMap;
@@ -134,6 +134,15 @@ impl FactorCache {
         let SystemFactor { symbolic, factor, columns, model, .. } = entry;
         work.columns = columns.prepare(model, &key.pins, symbolic, factor, surface_nodes, &mut self.scratch);
         Some(work)
+    }
+
+    /// Makes the columns of the first of these surface nodes that have none: one batch of them, so that
+    /// a coming touch finds them there. Returns how many.
+    pub fn prepare_ahead(&mut self, id: FactorId, pins: &[u32], surface_nodes: &[u32]) -> usize {
+        let SystemFactor { symbolic, factor, columns, model, system, .. } = &mut self.factors[id.0];
+        let missing = surface_nodes.iter().copied().filter(|s| !columns.has(*s));
+        let batch: Vec<u32> = missing.take(BATCH / system::dimension(*system)).collect();
+        columns.prepare(model, pins, symbolic, factor, batch.into_iter(), &mut self.scratch)
     }
 
     /// A factor that was prepared in this step.
