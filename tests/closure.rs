@@ -160,3 +160,79 @@ fn a_motor_presses_with_its_greatest_force() {
     let motor = physics.impulse_joints.get(joint).unwrap();
     assert_eq!(motor.data.motor_axes, JointAxesMask::LIN_X);
 }
+
+/// A bar hinged at one end to a fixed base, about z, as a multibody.
+fn hinged_link(physics: &mut PhysicsWorld, half: f32, mass: f64) -> (RigidBodyHandle, MultibodyJointHandle) {
+    let base = physics.insert_body(RigidBodyBuilder::fixed());
+    let bar = rigid_box(physics, Vector::X * half, Vector::new(half, 0.05, 0.2), mass);
+    let joint = RevoluteJointBuilder::new(Vector::Z).local_anchor2(Vector::X * -half);
+    let joint = physics.multibody_joints.insert(base, bar, joint, true).unwrap();
+    (bar, joint)
+}
+
+#[test]
+fn a_cube_dropped_on_a_free_link_turns_it_like_a_rigid_one() {
+    // Without gravity, thrown on the end of the bar. Both stay on it: the angular momentum about the
+    // hinge is what the cube brought, shared by the two bodies.
+    let spin = |soft: bool| {
+        let mut physics = PhysicsWorld::new();
+        physics.gravity = Vector::ZERO;
+        let (bar, _) = hinged_link(&mut physics, 0.5, 20.0);
+        let mut world = DeformableWorld::new();
+        // Rapier computes the multibody's matrices in its first step.
+        world.step(&mut physics);
+        let at = Vector::new(0.8, 0.17, 0.0);
+        let mut cube = None;
+        if soft {
+            let builder = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [3; 3])
+                .translation(at)
+                .linvel(Vector::Y * -2.0)
+                .material(DeformableMaterial::new(1e6, 0.3).friction(MU));
+            cube = Some(world.insert(builder).unwrap());
+        } else {
+            let body = rigid_box(&mut physics, at, Vector::splat(0.1), 8.0);
+            physics.bodies[body].set_linvel(Vector::Y * -2.0, true);
+        }
+        for _ in 0..12 {
+            world.step(&mut physics);
+        }
+        if let Some(cube) = cube {
+            assert!(world.bodies[cube].is_enabled());
+        }
+        f64::from(physics.bodies[bar].angvel().z)
+    };
+    let (soft, rigid) = (spin(true), spin(false));
+    println!("link: {soft} rad/s under a soft cube, {rigid} rad/s under a rigid one");
+    assert!((soft / rigid - 1.0).abs() < 0.02, "{soft} {rigid}");
+}
+
+#[test]
+fn an_arm_presses_a_pad_with_its_motors_torque() {
+    // A motor of limited torque turns the arm down on a soft pad on the floor, without gravity.
+    let mut physics = PhysicsWorld::new();
+    physics.gravity = Vector::ZERO;
+    let floor = RigidBodyBuilder::fixed().translation(Vector::Y * -0.75);
+    let (_, floor) = physics.insert(floor, ColliderBuilder::cuboid(2.0, 0.5, 2.0).friction(MU as f32));
+    let (bar, joint) = hinged_link(&mut physics, 0.5, 5.0);
+    let (multibody, link) = physics.multibody_joints.get_mut(joint).unwrap();
+    let motor = &mut multibody.link_mut(link).unwrap().joint.data;
+    motor.set_motor_model(JointAxis::AngX, MotorModel::ForceBased);
+    motor.set_motor_velocity(JointAxis::AngX, -1.0, 1e4);
+    motor.set_motor_max_force(JointAxis::AngX, 30.0);
+    let mut world = DeformableWorld::new();
+    let pad = DeformableBodyBuilder::cuboid(Vector::new(0.05, 0.1, 0.05), [2, 4, 2])
+        .translation(Vector::new(0.8, -0.151, 0.0))
+        .material(DeformableMaterial::new(1e6, 0.3).friction(MU));
+    let pad = world.insert(pad).unwrap();
+    let speed = settle(&mut physics, &mut world, &[bar], 300);
+    let on_bar = physics.bodies[bar].colliders()[0];
+    let torque: f64 = world
+        .contacts_with(on_bar)
+        .map(|c| f64::from(c.point.x) * f64::from(-c.force.y) - f64::from(c.point.y) * f64::from(-c.force.x))
+        .sum();
+    let on_floor = f64::from(world.contact_force(pad, floor).y);
+    println!("arm: {torque} N m of 30 on the pad, {on_floor} N on the floor, {speed:.1e} m/s");
+    assert!((torque.abs() / 30.0 - 1.0).abs() < 1e-2, "{torque} N m");
+    assert!((on_floor / (torque.abs() / 0.8) - 1.0).abs() < 0.05, "{on_floor} N");
+    assert!(speed < 1e-3, "{speed:e}");
+}
