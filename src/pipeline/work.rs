@@ -186,5 +186,6 @@ impl IslandWork {
                 memory.push(ContactMemory { key: row.key, force, shift_rate, nodes, weights });
             }
         }
+        memory.sort_unstable_by_key(|m| m.key);
     }
 }

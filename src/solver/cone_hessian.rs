@@ -1,8 +1,8 @@
 //! The matrix of a Newton step of the contact problem, factored: `I + LᵀWL`, with `L Lᵀ` the
 //! curvature of the contacts. By Woodbury's identity it gives `(1 + L Lᵀ W)⁻¹ b` [Castro et al. 2022].
 
+use super::block_matrix::BlockFactor;
 use super::cone_newton::ConeProblem;
-use super::factor::DenseFactor;
 use crate::contact::cone;
 use crate::math::vectorized;
 
@@ -12,7 +12,9 @@ pub(crate) struct ConeHessian {
     /// Columns of L per contact: their rows are those of the contact.
     columns: Vec<[[f64; 3]; 3]>,
     offsets: Vec<usize>,
-    factor: DenseFactor,
+    factor: BlockFactor,
+    /// First column of each block, and their number last.
+    starts: Vec<usize>,
     /// What the factor was made of: the same bits, the same factor.
     factored: Option<Factored>,
     spare: Factored,
@@ -96,49 +98,66 @@ impl ConeHessian {
         assemble(self, problem);
     }
 
-    /// The lower triangle, column by column: first the product of W with a column of L, then that of
-    /// its rows with the other columns.
+    /// Block by block and column by column: first the product of W with a column of L, then that of its
+    /// rows with the other columns.
     #[inline(always)]
     fn assemble_columns(&mut self, problem: &ConeProblem) {
-        let (size, m) = (self.order(), problem.rows());
+        self.starts.clear();
+        self.starts.extend(problem.groups.iter().map(|&contact| self.offsets[contact]));
+        let matrix = self.factor.matrix();
+        matrix.reset(&self.starts, &problem.filled);
         let mut product = std::mem::take(&mut self.product);
-        product.resize(m, 0.0);
-        let mut matrix = self.factor.take_matrix(size);
-        for j in 0..problem.contacts() {
-            let first = problem.offsets[j];
-            for (c, column) in self.columns_of(j).iter().enumerate() {
-                let at = self.offsets[j] + c;
-                let W = |k: usize| &problem.W[(first + k) * m + first..(first + k + 1) * m];
-                let below = &mut product[first..];
-                if problem.offsets[j + 1] - first == 3 {
-                    let (a, b, c) = (W(0), W(1), W(2));
-                    for (i, p) in below.iter_mut().enumerate() {
-                        *p = column[0] * a[i] + column[1] * b[i] + column[2] * c[i];
-                    }
-                } else {
-                    below.iter_mut().zip(W(0)).for_each(|(p, w)| *p = column[0] * w);
-                }
-                let entries = &mut matrix[at * size..(at + 1) * size];
-                for i in j..problem.contacts() {
-                    let rows = &product[problem.offsets[i]..problem.offsets[i + 1]];
-                    let entries = &mut entries[self.offsets[i]..self.offsets[i + 1]];
-                    match (rows, entries) {
-                        // Sticking: L is a multiple of the identity.
-                        ([x, y, z], [a, b, c]) => {
-                            let root = self.columns[i][0][0];
-                            (*a, *b, *c) = (root * x, root * y, root * z);
+        let coupled = &problem.W.pattern().pairs;
+        let mut known = 0;
+        for (k, &(gi, gj)) in problem.filled.iter().enumerate() {
+            // Both lists go column by column; what is not in the first is filled in by the factor.
+            if coupled.get(known) != Some(&(gi, gj)) {
+                continue;
+            }
+            let (W, entries) = (problem.W.block(known), matrix.block_mut(k));
+            known += 1;
+            let row_range = problem.W.pattern().range(gi);
+            let (m, size) = (row_range.len(), self.starts[gi + 1] - self.starts[gi]);
+            let first_row = problem.W.pattern().starts[gj];
+            product.resize(m, 0.0);
+            for j in problem.groups[gj]..problem.groups[gj + 1] {
+                let count = self.offsets[j + 1] - self.offsets[j];
+                let from = problem.offsets[j] - first_row;
+                let W = |row: usize| &W[(from + row) * m..(from + row + 1) * m];
+                for (c, column) in self.columns[j][..count].iter().enumerate() {
+                    if problem.offsets[j + 1] - problem.offsets[j] == 3 {
+                        let (x, y, z) = (W(0), W(1), W(2));
+                        for (i, p) in product.iter_mut().enumerate() {
+                            *p = column[0] * x[i] + column[1] * y[i] + column[2] * z[i];
                         }
-                        (rows, entries) => {
-                            let rows = spatial(rows);
-                            let columns = self.columns[i].iter();
-                            entries.iter_mut().zip(columns).for_each(|(e, c)| *e = dot(c, &rows));
+                    } else {
+                        product.iter_mut().zip(W(0)).for_each(|(p, w)| *p = column[0] * w);
+                    }
+                    let at = self.offsets[j] + c - self.starts[gj];
+                    let entries = &mut entries[at * size..(at + 1) * size];
+                    for i in problem.groups[gi]..problem.groups[gi + 1] {
+                        let rows =
+                            problem.offsets[i] - row_range.start..problem.offsets[i + 1] - row_range.start;
+                        let places = self.offsets[i] - self.starts[gi]..self.offsets[i + 1] - self.starts[gi];
+                        match (&product[rows], &mut entries[places]) {
+                            // Sticking: L is a multiple of the identity.
+                            ([x, y, z], [a, b, c]) => {
+                                let root = self.columns[i][0][0];
+                                (*a, *b, *c) = (root * x, root * y, root * z);
+                            }
+                            (rows, entries) => {
+                                let rows = spatial(rows);
+                                let columns = self.columns[i].iter();
+                                entries.iter_mut().zip(columns).for_each(|(e, c)| *e = dot(c, &rows));
+                            }
                         }
                     }
+                    if gi == gj {
+                        entries[at] += 1.0;
+                    }
                 }
-                entries[at] += 1.0;
             }
         }
-        self.factor.put_matrix(matrix, size);
         self.product = product;
     }
 }

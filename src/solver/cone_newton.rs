@@ -5,9 +5,9 @@
 //! With the projection γ(z) of −ĝ/R onto the cones, a globalised Newton method minimises the convex
 //! `f(z) = ½zᵀWz + ½γᵀRγ`, `∇f = W(z − γ)`, in the family of SAP [Castro et al. 2022].
 
+use super::block_matrix::BlockMatrix;
 use super::cone_hessian::{ConeHessian, dot, spatial};
 use crate::contact::{Law, cone};
-use crate::math::dense;
 
 /// The data of one problem. A contact has three rows, or one without friction; everything is packed.
 #[derive(Default)]
@@ -15,8 +15,12 @@ pub(crate) struct ConeProblem {
     /// First row of each contact, and the number of rows last.
     pub offsets: Vec<usize>,
     pub laws: Vec<Law>,
-    /// Delassus operator [m/N], dense, symmetric.
-    pub W: Vec<f64>,
+    /// Delassus operator [m/N], symmetric.
+    pub W: BlockMatrix,
+    /// First contact of each block, and the number of contacts last.
+    pub groups: Vec<usize>,
+    /// Pairs of blocks of W that its factor may fill.
+    pub filled: Vec<(usize, usize)>,
     /// Changes whenever W does.
     pub version: u64,
     /// Gaps and slips without contact forces \[m\], the shift included in the normal ones.
@@ -67,6 +71,7 @@ pub(crate) struct ConeSolver {
     Wdz: Vec<f64>,
     center: Vec<f64>,
     R: Vec<f64>,
+    diagonal: Vec<f64>,
     hessian: ConeHessian,
 }
 
@@ -79,14 +84,9 @@ impl ConeProblem {
         self.laws.len()
     }
 
-    fn w(&self, i: usize, j: usize) -> f64 {
-        self.W[j * self.rows() + i]
-    }
-
     /// `out = W v`.
     pub fn multiply(&self, v: &[f64], out: &mut Vec<f64>) {
-        out.resize(self.rows(), 0.0);
-        dense::multiply(&self.W, v, out);
+        self.W.multiply(v, out);
     }
 }
 
@@ -268,10 +268,11 @@ impl ConeSolver {
     }
 
     fn set_regularisation(&mut self, problem: &ConeProblem, epsilon: f64) {
+        problem.W.diagonal(&mut self.diagonal);
         self.R.clear();
         for i in 0..problem.contacts() {
             let rows = problem.offsets[i]..problem.offsets[i + 1];
-            let stiffest = rows.map(|k| problem.w(k, k)).fold(0.0, f64::max);
+            let stiffest = self.diagonal[rows].iter().copied().fold(0.0, f64::max);
             // Rows that nothing yields to: any positive number keeps them harmless.
             self.R.push(epsilon * stiffest.max(f64::MIN_POSITIVE.sqrt()));
         }

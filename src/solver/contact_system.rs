@@ -5,6 +5,7 @@
 
 use super::body_problem::BodyProblem;
 use super::cone_newton::{ConeProblem, ConeSolver, ConeTolerance, ConeWork};
+use super::contact_groups::ContactGroups;
 use super::factor_cache::{FactorCache, SystemFactor};
 use super::partner::{Partner, Partners, Reaction};
 use crate::contact::{Law, Row, Side};
@@ -15,6 +16,9 @@ use crate::math::{Mat3, Vec3};
 pub(crate) struct ContactSystem {
     pub rows: Vec<Row>,
     problem: ConeProblem,
+    groups: ContactGroups,
+    /// First row of each group, and the number of rows last.
+    starts: Vec<usize>,
     solver: ConeSolver,
     /// Forces \[N\], packed as the problem is.
     pub lambda: Vec<f64>,
@@ -126,6 +130,7 @@ impl ContactSystem {
 
     /// Packs the rows for a step of `h` \[s\], with their warm starts, which are laid on the nodes.
     pub fn begin(&mut self, bodies: &mut [BodyProblem], partners: &Partners, h: f64, limits: &ContactLimits) {
+        self.groups.arrange(&mut self.rows, partners);
         self.problem.offsets.clear();
         self.problem.offsets.push(0);
         self.problem.laws.clear();
@@ -152,27 +157,41 @@ impl ContactSystem {
             return self.problem.multiply(&self.lambda, &mut self.slips);
         }
         self.fresh = std::mem::replace(&mut self.made_from, made_from);
-        let m = self.problem.rows();
         let mut W = std::mem::take(&mut self.problem.W);
-        W.clear();
-        W.resize(m * m, 0.0);
-        let offsets = &self.problem.offsets;
-        for (j, b) in self.rows.iter().enumerate() {
-            for (i, a) in self.rows.iter().enumerate().skip(j) {
-                let block = compliance(a, b, bodies, factors, partners, h);
-                let Some(block) = block else { continue };
-                for c in 0..b.dimension() {
-                    for r in 0..a.dimension() {
-                        W[(offsets[j] + c) * m + offsets[i] + r] = block[(r, c)];
-                        W[(offsets[i] + r) * m + offsets[j] + c] = block[(r, c)];
+        let (offsets, groups) = (&self.problem.offsets, &self.groups);
+        self.starts.clear();
+        self.starts.extend(groups.starts.iter().map(|&contact| offsets[contact]));
+        W.reset(&self.starts, &groups.coupled);
+        for (k, &(gi, gj)) in groups.coupled.iter().enumerate() {
+            let (first_row, first_column) = (self.starts[gi], self.starts[gj]);
+            let m = self.starts[gi + 1] - first_row;
+            let values = W.block_mut(k);
+            for j in groups.starts[gj]..groups.starts[gj + 1] {
+                // The diagonal's blocks are symmetric.
+                let from = if gi == gj { j } else { groups.starts[gi] };
+                for i in from..groups.starts[gi + 1] {
+                    let (a, b) = (&self.rows[i], &self.rows[j]);
+                    let block = compliance(a, b, bodies, factors, partners, h);
+                    let Some(block) = block else { continue };
+                    let (row, column) = (offsets[i] - first_row, offsets[j] - first_column);
+                    for c in 0..b.dimension() {
+                        for r in 0..a.dimension() {
+                            values[(column + c) * m + row + r] = block[(r, c)];
+                            if gi == gj {
+                                values[(row + r) * m + column + c] = block[(r, c)];
+                            }
+                        }
                     }
+                }
+                if gi == gj {
+                    let own = offsets[j] - first_row;
+                    values[own * m + own] += self.rows[j].compliance;
                 }
             }
         }
-        for (i, row) in self.rows.iter().enumerate() {
-            W[offsets[i] * m + offsets[i]] += row.compliance;
-        }
         self.problem.W = W;
+        self.problem.groups.clone_from(&groups.starts);
+        self.problem.filled.clone_from(&groups.filled);
         self.problem.version += 1;
         self.problem.multiply(&self.lambda, &mut self.slips);
     }

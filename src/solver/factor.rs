@@ -250,54 +250,40 @@ impl FactorScratch {
     }
 }
 
-/// Dense Cholesky factor of a symmetric positive definite matrix.
+/// Memory for dense factorizations.
 #[derive(Default)]
-pub(crate) struct DenseFactor {
+pub(crate) struct DenseScratch(FactorScratch);
+
+/// Factors a dense symmetric matrix of order n, of which only the lower triangle is read, in its place.
+pub(crate) fn cholesky(
+    values: &mut [f64],
     n: usize,
-    values: Vec<f64>,
-    scratch: FactorScratch,
+    scratch: &mut DenseScratch,
+) -> Result<(), NotPositiveDefinite> {
+    let need = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Spec::default());
+    llt::factor::cholesky_in_place(
+        MatMut::from_column_major_slice_mut(values, n, n),
+        Default::default(),
+        Par::Seq,
+        scratch.0.stack(need.unaligned_bytes_required()),
+        Spec::default(),
+    )
+    .map(|_| ())
+    .map_err(|_| NotPositiveDefinite)
 }
 
-impl DenseFactor {
-    /// The memory for a matrix of order n, column by column, to be filled and put back; only its lower
-    /// triangle is read.
-    pub fn take_matrix(&mut self, n: usize) -> Vec<f64> {
-        let mut values = std::mem::take(&mut self.values);
-        values.resize(n * n, 0.0);
-        values
-    }
+/// `B ← B L⁻ᵀ` for `rows` rows of B, L of order n.
+pub(crate) fn solve_from_right(L: &[f64], n: usize, B: &mut [f64], rows: usize) {
+    let L = MatRef::from_column_major_slice(L, n, n);
+    let B = MatMut::from_column_major_slice_mut(B, rows, n);
+    solve_lower_triangular_in_place(L, B.transpose_mut(), Par::Seq);
+}
 
-    /// Puts a matrix of order n in place.
-    pub fn put_matrix(&mut self, values: Vec<f64>, n: usize) {
-        assert_eq!(values.len(), n * n);
-        (self.values, self.n) = (values, n);
-    }
-
-    /// Factors the matrix in its place.
-    pub fn factorize(&mut self) -> Result<(), NotPositiveDefinite> {
-        let n = self.n;
-        let need = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Spec::default());
-        llt::factor::cholesky_in_place(
-            MatMut::from_column_major_slice_mut(&mut self.values, n, n),
-            Default::default(),
-            Par::Seq,
-            self.scratch.stack(need.unaligned_bytes_required()),
-            Spec::default(),
-        )
-        .map(|_| ())
-        .map_err(|_| NotPositiveDefinite)
-    }
-
-    /// Solves in place.
-    pub fn solve(&mut self, rhs: &mut [f64]) {
-        let n = self.n;
-        llt::solve::solve_in_place(
-            MatRef::from_column_major_slice(&self.values, n, n),
-            MatMut::from_column_major_slice_mut(rhs, n, 1),
-            Par::Seq,
-            self.scratch.stack(0),
-        );
-    }
+/// `C −= A Bᵀ`, with A of p × r, B of q × r numbers, `sizes` being [p, q, r].
+pub(crate) fn subtract_product(C: &mut [f64], A: &[f64], B: &[f64], [p, q, r]: [usize; 3]) {
+    let (A, B) = (MatRef::from_column_major_slice(A, p, r), MatRef::from_column_major_slice(B, q, r));
+    let C = MatMut::from_column_major_slice_mut(C, p, q);
+    matmul(C, Accum::Add, A, B.transpose(), -1.0, Par::Seq);
 }
 
 #[cfg(test)]
@@ -337,22 +323,7 @@ mod tests {
             symbolic.solve(&factor, &mut sparse, &mut scratch);
             let mut batch = b.clone();
             symbolic.solve_batch(&factor, &mut batch, columns, &mut scratch);
-            let mut dense = DenseFactor::default();
-            dense.put_matrix((0..n * n).map(|k| at(k % n, k / n)).collect(), n);
-            dense.factorize().unwrap();
-            let mut column = b[..n].to_vec();
-            dense.solve(&mut column);
             for k in 0..n * columns { prop_assert!((sparse[k] - x[k]).abs() < 1e-13 && (batch[k] - x[k]).abs() < 1e-13); }
-            for k in 0..n { prop_assert!((column[k] - x[k]).abs() < 1e-13); }
-        }
-    }
-
-    #[test]
-    fn indefinite_and_non_finite_matrices_are_refused() {
-        let mut dense = DenseFactor::default();
-        for bad in [-1.0, f64::NAN] {
-            dense.put_matrix(vec![1.0, 0.0, 0.0, bad], 2);
-            assert_eq!(dense.factorize(), Err(NotPositiveDefinite));
         }
     }
 }

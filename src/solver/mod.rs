@@ -3,10 +3,12 @@
 //!
 //! Architecture invariant: nothing here knows rapier; only `factor.rs` names faer.
 
+mod block_matrix;
 mod body_problem;
 mod columns;
 mod cone_hessian;
 mod cone_newton;
+mod contact_groups;
 mod contact_system;
 mod effort;
 mod factor;

@@ -1,5 +1,6 @@
 //! The solver against dense and brute-force twins.
 
+use super::block_matrix::BlockMatrix;
 use super::body_problem::BodyProblem;
 use super::cone_newton::{ConeProblem, ConeSolver, ConeTolerance};
 use super::contact_system::{ContactLimits, ContactSystem};
@@ -184,6 +185,13 @@ fn translation_is_exact_in_every_metric() {
     }
 }
 
+fn block(values: &[f64], n: usize) -> BlockMatrix {
+    let mut matrix = BlockMatrix::default();
+    matrix.reset(&[0, n], &[(0, 0)]);
+    matrix.block_mut(0).copy_from_slice(values);
+    matrix
+}
+
 /// `W = B Bᵀ` of rank `rank` over `contacts` contacts, some of them copies of others.
 fn random_problem(contacts: usize, rank: usize, mu: f64, numbers: &[f64]) -> ConeProblem {
     let m = 3 * contacts;
@@ -202,7 +210,9 @@ fn random_problem(contacts: usize, rank: usize, mu: f64, numbers: &[f64]) -> Con
         offsets: (0..=contacts).map(|i| 3 * i).collect(),
         laws: vec![Law::Contact { friction: mu }; contacts],
         version: 0,
-        W: W.as_slice().to_vec(),
+        W: block(W.as_slice(), m),
+        groups: vec![0, contacts],
+        filled: vec![(0, 0)],
         g: g.as_slice().to_vec(),
     }
 }
@@ -216,7 +226,7 @@ fn objective(problem: &ConeProblem, lambda: &[f64]) -> f64 {
 /// Accelerated projected gradients on `½λᵀWλ + gᵀλ` over the cones.
 fn brute_force(problem: &ConeProblem) -> Vec<f64> {
     let m = problem.rows();
-    let step = 1.0 / (0..m).map(|k| problem.W[k * m + k]).sum::<f64>();
+    let step = 1.0 / (0..m).map(|k| problem.W.block(0)[k * m + k]).sum::<f64>();
     let (mut lambda, mut ahead, mut t) = (vec![0.0; m], vec![0.0; m], 1.0f64);
     let mut Wl = Vec::new();
     for _ in 0..60_000 {

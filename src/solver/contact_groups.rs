@@ -1,0 +1,139 @@
+//! Contacts in groups between the same two things, ordered so that the factor of their matrix fills in
+//! little.
+
+use super::partner::Partners;
+use crate::contact::{Row, Side};
+
+/// The groups of an island's contacts and which of them know of one another.
+#[derive(Default)]
+pub(crate) struct ContactGroups {
+    /// First contact of each group, and the number of contacts last.
+    pub starts: Vec<usize>,
+    /// Pairs of groups (row, column) of the lower triangle that share something which yields.
+    pub coupled: Vec<(usize, usize)>,
+    /// Those pairs, and those that elimination in this order adds.
+    pub filled: Vec<(usize, usize)>,
+    ends: Vec<[Option<u64>; 2]>,
+    group_of_row: Vec<usize>,
+    sizes: Vec<usize>,
+    /// Adjacency during elimination, row by row.
+    adjacent: Vec<bool>,
+    eliminated: Vec<bool>,
+    rank: Vec<usize>,
+    /// The group at each rank.
+    order: Vec<usize>,
+}
+
+impl ContactGroups {
+    /// Puts the rows into groups, and the groups into an order of least degree.
+    pub fn arrange(&mut self, rows: &mut [Row], partners: &Partners) {
+        self.find(rows, partners);
+        self.eliminate();
+        let (group_of_row, rank) = (&mut self.group_of_row, &self.rank);
+        // Insertion by cycles would be less memory; rows are few and mostly in order.
+        let sorted = group_of_row.windows(2).all(|w| rank[w[0]] <= rank[w[1]]);
+        if !sorted {
+            let ends = &self.ends;
+            let rank_of = |row: &Row| {
+                let own = ends_of(row, partners);
+                ends.iter().position(|e| *e == own).map_or(usize::MAX, |g| rank[g])
+            };
+            rows.sort_unstable_by(|a, b| rank_of(a).cmp(&rank_of(b)).then(a.key.cmp(&b.key)));
+        }
+        let groups = self.sizes.len();
+        self.starts.clear();
+        self.starts.push(0);
+        for place in 0..groups {
+            self.starts.push(self.starts[place] + self.sizes[self.order[place]]);
+        }
+        self.fill();
+    }
+
+    fn find(&mut self, rows: &[Row], partners: &Partners) {
+        self.ends.clear();
+        self.sizes.clear();
+        self.group_of_row.clear();
+        for row in rows {
+            let ends = ends_of(row, partners);
+            let last = self.group_of_row.last().copied().filter(|&g: &usize| self.ends[g] == ends);
+            let known = last.or_else(|| self.ends.iter().position(|e| *e == ends));
+            let group = known.unwrap_or_else(|| {
+                self.ends.push(ends);
+                self.sizes.push(0);
+                self.ends.len() - 1
+            });
+            self.sizes[group] += 1;
+            self.group_of_row.push(group);
+        }
+        let groups = self.ends.len();
+        self.adjacent.clear();
+        self.adjacent.resize(groups * groups, false);
+        for a in 0..groups {
+            for b in 0..groups {
+                let shared = self.ends[a].iter().flatten().any(|e| self.ends[b].contains(&Some(*e)));
+                self.adjacent[a * groups + b] = shared || a == b;
+            }
+        }
+    }
+
+    /// Least degree first, counted in contacts; ties by index.
+    fn eliminate(&mut self) {
+        let groups = self.sizes.len();
+        self.eliminated.clear();
+        self.eliminated.resize(groups, false);
+        self.rank.clear();
+        self.rank.resize(groups, 0);
+        self.order.clear();
+        let mut adjacent = std::mem::take(&mut self.adjacent);
+        for place in 0..groups {
+            let degree = |g: usize| -> usize {
+                let others = (0..groups).filter(|&o| adjacent[g * groups + o] && !self.eliminated[o]);
+                others.map(|o| self.sizes[o]).sum()
+            };
+            let open = (0..groups).filter(|&g| !self.eliminated[g]);
+            let Some(next) = open.min_by_key(|&g| (degree(g), g)) else { break };
+            self.rank[next] = place;
+            self.order.push(next);
+            self.eliminated[next] = true;
+            for a in 0..groups {
+                for b in 0..groups {
+                    let both = adjacent[next * groups + a] && adjacent[next * groups + b];
+                    if both && !self.eliminated[a] && !self.eliminated[b] {
+                        adjacent[a * groups + b] = true;
+                    }
+                }
+            }
+        }
+        self.adjacent = adjacent;
+    }
+
+    /// Lists the pairs in the new order.
+    fn fill(&mut self) {
+        let groups = self.sizes.len();
+        self.coupled.clear();
+        self.filled.clear();
+        for j in 0..groups {
+            for i in j..groups {
+                let (a, b) = (self.order[i], self.order[j]);
+                let shared = self.ends[a].iter().flatten().any(|e| self.ends[b].contains(&Some(*e)));
+                if shared || i == j {
+                    self.coupled.push((i, j));
+                }
+                if self.adjacent[a * groups + b] {
+                    self.filled.push((i, j));
+                }
+            }
+        }
+    }
+}
+
+/// The two things that a row is between, as far as they yield.
+fn ends_of(row: &Row, partners: &Partners) -> [Option<u64>; 2] {
+    [&row.sides[0], &row.sides[1]].map(|side| match side {
+        Side::Soft { body, .. } => Some(*body as u64),
+        Side::Partner { partner, .. } | Side::Turn { partner } => {
+            let group = partners.group(*partner);
+            partners.yields(*partner).then(|| 1 << 32 | u64::from(group.0))
+        }
+    })
+}
