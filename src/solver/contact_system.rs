@@ -84,7 +84,10 @@ impl Ingredients {
                     }
                     Side::Partner { partner, point } => {
                         self.nodes.push(partner.0);
-                        self.bits.extend(point.iter());
+                        // Where it is touched does not matter to what does not yield.
+                        if partners.yields(*partner) {
+                            self.bits.extend(point.iter());
+                        }
                         self.describe_partner(partners.get(*partner));
                     }
                     Side::Turn { partner } => {
