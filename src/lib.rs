@@ -45,8 +45,9 @@ mod coupling;
 mod pipeline;
 
 pub use body::{
-    Acceleration, BodyError, DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet,
-    DeformableModel, DeformableState, FactorPrecision, Frames, Pin, SolverSettings, SystemMatrix,
+    Acceleration, AttachTo, BodyError, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
+    DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableModel, DeformableState,
+    FactorPrecision, Frames, Pin, SolverSettings, SystemMatrix,
 };
 pub use coupling::PhysicsParts;
 pub use energy::Elasticity;
@@ -60,10 +61,11 @@ pub use pipeline::{
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
 pub mod prelude {
     pub use crate::{
-        Acceleration, DeformableBody, DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle,
-        DeformableBodySet, DeformableContact, DeformableCounters, DeformableMaterial, DeformableModel,
-        DeformableParameters, DeformablePipeline, DeformableWorld, Elasticity, FactorPrecision, Frames,
-        PhysicsParts, SolverSettings, SystemMatrix, TetMesh,
+        Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
+        DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
+        DeformableContact, DeformableCounters, DeformableMaterial, DeformableModel, DeformableParameters,
+        DeformablePipeline, DeformableWorld, Elasticity, FactorPrecision, Frames, PhysicsParts,
+        SolverSettings, SystemMatrix, TetMesh,
     };
 }
 

@@ -33,6 +33,12 @@ pub enum BodyError {
         /// Vertices of the body.
         expected: usize,
     },
+    /// The vertex is inside of the body.
+    #[error("vertex {vertex} is not on the surface")]
+    NotOnSurface {
+        /// The index asked for.
+        vertex: usize,
+    },
     /// The vertex is not pinned.
     #[error("vertex {vertex} is not pinned")]
     NotPinned {
@@ -521,7 +527,7 @@ impl DeformableBody {
         self.material.density * self.model.node_volumes[node]
     }
 
-    fn node(&self, vertex: usize) -> Result<usize, BodyError> {
+    pub(super) fn node(&self, vertex: usize) -> Result<usize, BodyError> {
         self.model.node(vertex).ok_or(BodyError::NoSuchVertex { vertex, vertices: self.vertex_count() })
     }
 

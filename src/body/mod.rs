@@ -4,6 +4,7 @@
 //! Architecture invariant: vertex indices at the surface of this module are the user's; inside,
 //! nodes are renumbered for locality, and only `DeformableModel` translates.
 
+mod attachment;
 #[allow(clippy::module_inception)]
 mod body;
 mod builder;
@@ -13,10 +14,12 @@ mod set;
 mod settings;
 mod state;
 
+pub(crate) use attachment::Anchors;
+pub use attachment::{AttachTo, DeformableAttachment, DeformableAttachmentHandle};
 pub use body::{BodyError, DeformableBody, Pin};
 pub use builder::DeformableBodyBuilder;
 pub use model::DeformableModel;
 pub use set::{DeformableBodyHandle, DeformableBodySet};
 pub use settings::{Acceleration, FactorPrecision, Frames, SolverSettings, SystemMatrix};
 pub use state::DeformableState;
-pub(crate) use state::{ContactKey, ContactMemory, is_number};
+pub(crate) use state::{ContactKey, ContactMemory, FIRST_LINK_SLOT, is_number};

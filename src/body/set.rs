@@ -1,9 +1,11 @@
 //! The set of all bodies of a world.
 
+use super::attachment::{DeformableAttachment, DeformableAttachmentHandle};
 use super::body::DeformableBody;
 use super::builder::DeformableBodyBuilder;
 use crate::error::{DeformableBodyError, HandleError};
 use rapier3d::data::arena::{Arena, Index};
+use std::collections::BTreeMap;
 use std::ops::{Index as At, IndexMut as AtMut};
 
 /// Names a body of a [`DeformableBodySet`]. Generational: a handle of a removed body never names
@@ -27,6 +29,8 @@ impl DeformableBodyHandle {
 #[derive(Clone, Debug, Default)]
 pub struct DeformableBodySet {
     bodies: Arena<DeformableBody>,
+    attachments: BTreeMap<DeformableAttachmentHandle, DeformableAttachment>,
+    attached: u64,
 }
 
 impl DeformableBodySet {
@@ -51,12 +55,50 @@ impl DeformableBodySet {
         DeformableBodyHandle(self.bodies.insert(body))
     }
 
-    /// Takes a body out.
+    pub(super) fn insert_attachment(
+        &mut self,
+        attachment: DeformableAttachment,
+    ) -> DeformableAttachmentHandle {
+        let handle = DeformableAttachmentHandle(self.attached);
+        self.attached += 1;
+        self.attachments.insert(handle, attachment);
+        handle
+    }
+
+    /// Removes an attachment; `None` if it was removed before.
+    pub fn detach(&mut self, handle: DeformableAttachmentHandle) -> Option<DeformableAttachment> {
+        self.attachments.remove(&handle)
+    }
+
+    /// The attachment of a handle.
+    pub fn attachment(&self, handle: DeformableAttachmentHandle) -> Option<&DeformableAttachment> {
+        self.attachments.get(&handle)
+    }
+
+    /// The attachment of a handle, to be changed.
+    pub fn attachment_mut(
+        &mut self,
+        handle: DeformableAttachmentHandle,
+    ) -> Option<&mut DeformableAttachment> {
+        self.attachments.get_mut(&handle)
+    }
+
+    /// All attachments, oldest first.
+    pub fn attachments(&self) -> impl Iterator<Item = (DeformableAttachmentHandle, &DeformableAttachment)> {
+        self.attachments.iter().map(|(handle, attachment)| (*handle, attachment))
+    }
+
+    pub(crate) fn attachments_mut(&mut self) -> impl Iterator<Item = &mut DeformableAttachment> {
+        self.attachments.values_mut()
+    }
+
+    /// Takes a body out, and its attachments.
     ///
     /// # Errors
     /// [`HandleError::NoSuchBody`].
     pub fn remove(&mut self, handle: DeformableBodyHandle) -> Result<DeformableBody, DeformableBodyError> {
         let body = self.bodies.remove(handle.0);
+        self.attachments.retain(|_, attachment| !attachment.ties(handle));
         body.ok_or_else(|| handle.no_such_body().into())
     }
 

@@ -31,6 +31,17 @@ pub(crate) struct ContactKey {
     pub slot: u32,
 }
 
+/// Slots from here on name rows that are no contacts of a deformable body: what holds rigid bodies, and
+/// attachments.
+pub(crate) const FIRST_LINK_SLOT: u32 = u32::MAX - 15;
+
+impl ContactKey {
+    /// Whether it names a row that belongs to an island and not to one body.
+    pub fn is_link(&self) -> bool {
+        self.slot >= FIRST_LINK_SLOT
+    }
+}
+
 /// What one contact leaves to the next step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ContactMemory {

@@ -74,11 +74,6 @@ impl Row {
         }
     }
 
-    /// Whether it is between rigid bodies.
-    pub fn is_closure(&self) -> bool {
-        self.sides.iter().all(|side| side.partner().is_some())
-    }
-
     /// Directions of those rows.
     pub fn directions(&self) -> &[Vec3] {
         &self.frame[..self.dimension()]

@@ -8,7 +8,7 @@
 use super::joint_rows::{JointEnds, drive_rows, joint_rows};
 use super::obstacles::RapierScene;
 use super::parts::RapierSets;
-use crate::body::ContactKey;
+use crate::body::{ContactKey, FIRST_LINK_SLOT};
 use crate::contact::{Law, PartnerId, Row, Side};
 use crate::math::{Pose64, from_real};
 use crate::solver::Partner;
@@ -32,11 +32,11 @@ pub(crate) struct Closure {
 }
 
 /// Where in [`ContactKey::slot`] rows of rapier's contacts are told from those of its joints.
-const CONTACT_SLOT: u32 = u32::MAX;
+const CONTACT_SLOT: u32 = FIRST_LINK_SLOT;
 /// As [`CONTACT_SLOT`].
-const JOINT_SLOT: u32 = u32::MAX - 1;
+const JOINT_SLOT: u32 = FIRST_LINK_SLOT + 1;
 /// As [`CONTACT_SLOT`], of the joints of multibodies.
-const LINK_SLOT: u32 = u32::MAX - 2;
+const LINK_SLOT: u32 = FIRST_LINK_SLOT + 2;
 /// Points of a manifold that keys tell apart.
 const POINTS: u32 = 1 << 16;
 

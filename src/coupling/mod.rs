@@ -9,9 +9,11 @@ mod joint_rows;
 mod obstacles;
 mod parts;
 mod reactions;
+mod ties;
 
 pub(crate) use closure::Closure;
 pub(crate) use obstacles::{RapierScene, combined};
 pub use parts::PhysicsParts;
 pub(crate) use parts::RapierSets;
 pub(crate) use reactions::Reactions;
+pub(crate) use ties::{attachment_of, tie_rows};

@@ -77,6 +77,12 @@ impl RapierScene {
         ColliderHandle::from_raw_parts((key >> 32) as u32, key as u32)
     }
 
+    /// A partner that stays where it is.
+    pub fn world_partner(&mut self) -> PartnerId {
+        let pose = Pose64 { rotation: Mat3::identity(), translation: Vec3::zeros() };
+        self.push_partner(Partner::Prescribed { start: pose, end: pose }, None)
+    }
+
     /// The partner of a body; read now if none of its colliders was.
     pub fn body_partner(
         &mut self,

@@ -1,8 +1,8 @@
 //! Which bodies have to be solved together: those that touch the same yielding partner, directly or
-//! through what holds it.
+//! through what ties or holds it.
 
 use super::work::{BodyWork, IslandWork};
-use crate::contact::Row;
+use crate::contact::{Row, Side};
 use crate::solver::Partners;
 
 /// Memory for forming islands.
@@ -16,16 +16,16 @@ pub(super) struct Grouping {
 }
 
 impl Grouping {
-    /// Moves the problems and rows of all bodies, and the rows between their partners, into islands,
+    /// Moves the problems and rows of all bodies, and the rows between them or their partners, into islands,
     /// ordered by their first bodies; returns how many there are.
     pub fn form(
         &mut self,
         works: &mut [BodyWork],
-        closure: &mut Vec<Row>,
+        links: &mut Vec<Row>,
         partners: &Partners,
         islands: &mut Vec<IslandWork>,
     ) -> usize {
-        self.join(works, closure, partners);
+        self.join(works, links, partners);
         for island in islands.iter_mut() {
             island.members.clear();
             island.island.contacts.rows.clear();
@@ -42,42 +42,38 @@ impl Grouping {
             }
             islands[place].take_in(index, &mut works[index]);
         }
-        for row in closure.drain(..) {
-            let root = self.yielding(&row, partners).next().map(|p| self.root_of(p));
+        for row in links.drain(..) {
+            let root = self.ends(&row, partners).next().map(|p| self.root_of(p));
             // Partners that no body touches have an index beyond the bodies for their root.
             if let Some(Some(place)) = root.and_then(|root| self.island_of_root.get(root)) {
-                islands[*place].island.contacts.rows.push(row);
+                islands[*place].take_in_link(row);
             }
         }
         islands.truncate(count);
         count
     }
 
-    fn join(&mut self, works: &[BodyWork], closure: &[Row], partners: &Partners) {
+    fn join(&mut self, works: &[BodyWork], links: &[Row], partners: &Partners) {
         self.bodies = works.len();
         self.parent.clear();
         self.parent.extend(0..works.len() + partners.list.len());
-        for (index, work) in works.iter().enumerate() {
-            for row in &work.rows {
-                for partner in self.yielding(row, partners) {
-                    self.unite(index, partner);
-                }
-            }
-        }
-        for row in closure {
-            let mut ends = self.yielding(row, partners);
+        for row in works.iter().flat_map(|work| &work.rows).chain(links) {
+            let mut ends = self.ends(row, partners);
             if let (Some(a), Some(b)) = (ends.next(), ends.next()) {
                 self.unite(a, b);
             }
         }
     }
 
-    /// Places of the yielding partners of a row.
-    fn yielding<'a>(&self, row: &'a Row, partners: &'a Partners) -> impl Iterator<Item = usize> + use<'a> {
+    /// Places of the soft bodies and yielding partners of a row.
+    fn ends<'a>(&self, row: &'a Row, partners: &'a Partners) -> impl Iterator<Item = usize> + use<'a> {
         let first = self.bodies;
-        let ends = row.sides.iter().filter_map(|side| side.partner());
-        let yielding = ends.filter(|partner| partners.yields(*partner));
-        yielding.map(move |partner| first + partners.group(partner).0 as usize)
+        row.sides.iter().filter_map(move |side| match side {
+            Side::Soft { body, .. } => Some(*body),
+            Side::Partner { partner, .. } | Side::Turn { partner } => {
+                partners.yields(*partner).then(|| first + partners.group(*partner).0 as usize)
+            }
+        })
     }
 
     fn unite(&mut self, a: usize, b: usize) {

@@ -1,7 +1,7 @@
 //! The step.
 //!
 //! ```text
-//! read_obstacles → predict → detect → close → prepare_factors → form_islands → solve → advance
+//! read_obstacles → predict → detect → tie → close → prepare_factors → form_islands → solve → advance
 //! → write reactions → (rapier steps) → after_step
 //! ```
 
@@ -10,9 +10,12 @@ use super::grouping::Grouping;
 use super::parameters::{DeformableCounters, DeformableParameters};
 use super::threads::for_each;
 use super::work::{BodyWork, IslandWork};
-use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, is_number};
-use crate::contact::{Candidates, Side};
-use crate::coupling::{Closure, PhysicsParts, RapierScene, RapierSets, Reactions};
+use crate::body::{
+    DeformableAttachment, DeformableAttachmentHandle, DeformableBody, DeformableBodyHandle,
+    DeformableBodySet, is_number,
+};
+use crate::contact::{Candidates, Row, Side};
+use crate::coupling::{Closure, PhysicsParts, RapierScene, RapierSets, Reactions, attachment_of, tie_rows};
 use crate::error::DeformableBodyError;
 use crate::math::{Vec3, from_real, to_real};
 use crate::solver::{FactorCache, FactorKey, ROUNDING, Reaction};
@@ -35,6 +38,7 @@ pub struct DeformablePipeline {
     islands: Vec<IslandWork>,
     grouping: Grouping,
     closure: Closure,
+    ties: Vec<Row>,
     reaction_list: Vec<Reaction>,
     reactions: Reactions,
     contacts: Vec<DeformableContact>,
@@ -71,6 +75,7 @@ impl DeformablePipeline {
         self.read_obstacles(sets, gravity, h);
         self.predict(deformables, gravity, h);
         self.detect(deformables, sets);
+        self.tie(deformables, sets, gravity, h);
         self.close(sets, gravity, h, parameters.closure_bodies);
         self.counters.detection_time = clock.lap();
         self.prepare_factors(deformables, h, parameters.column_budget);
@@ -169,25 +174,49 @@ impl DeformablePipeline {
             work.set_factor(done.id);
             true
         });
+        // Rows name bodies by their places, which a body put aside has changed.
+        if self.works.iter().enumerate().any(|(place, work)| work.index != place) {
+            self.ties.clear();
+            for (place, work) in self.works.iter_mut().enumerate() {
+                work.move_to(place);
+            }
+        }
         self.counters.factor_bytes = self.factors.factor_bytes();
         self.counters.column_bytes = self.factors.column_bytes();
     }
 
+    /// Rows of the attachments.
+    fn tie(&mut self, deformables: &DeformableBodySet, sets: RapierSets<'_>, gravity: Vector, h: f64) {
+        self.ties.clear();
+        self.works.iter_mut().for_each(|work| work.tied.clear());
+        // Works are in the order of the set.
+        let works = &self.works;
+        let index_of = |handle: DeformableBodyHandle| works.iter().position(|w| w.handle == handle);
+        tie_rows(deformables, &mut self.scene, sets, gravity, h, index_of, &mut self.ties);
+        for side in self.ties.iter().flat_map(|row| &row.sides) {
+            if let Side::Soft { body, nodes, .. } = side {
+                self.works[*body].tied.push(nodes[0]);
+            }
+        }
+    }
+
     /// Finds what else holds the rigid bodies that are touched.
     fn close(&mut self, sets: RapierSets<'_>, gravity: Vector, h: f64, limit: usize) {
-        let sides = self.works.iter().flat_map(|work| &work.rows).flat_map(|row| &row.sides);
+        let rows = self.works.iter().flat_map(|work| &work.rows).chain(&self.ties);
+        let sides = rows.flat_map(|row| &row.sides);
         let touched = sides.filter_map(|side| side.partner());
         self.closure.walk(&mut self.scene, sets, touched, gravity, h, limit);
         self.counters.closure_rows = self.closure.rows.len();
     }
 
     fn form_islands(&mut self, deformables: &DeformableBodySet) {
-        let (works, closure) = (&mut self.works, &mut self.closure.rows);
-        self.counters.islands = self.grouping.form(works, closure, &self.scene.partners, &mut self.islands);
+        let (works, links) = (&mut self.works, &mut self.closure.rows);
+        links.append(&mut self.ties);
+        self.counters.islands = self.grouping.form(works, links, &self.scene.partners, &mut self.islands);
         for work in &mut self.islands {
             for member in 0..work.members.len() {
                 let handle = self.works[work.members[member]].handle;
-                work.recall_closure(deformables[handle].state());
+                work.recall_links(deformables[handle].state());
             }
         }
     }
@@ -202,6 +231,7 @@ impl DeformablePipeline {
     }
 
     fn advance(&mut self, deformables: &mut DeformableBodySet, h: f64) {
+        deformables.attachments_mut().for_each(|a| a.force = Vec3::zeros());
         self.reaction_list.clear();
         self.reaction_list.resize(self.scene.partners.list.len(), Reaction::default());
         for work in &mut self.islands {
@@ -220,11 +250,13 @@ impl DeformablePipeline {
                 contacts.add_reactions(&self.scene.partners, h, &mut self.reaction_list);
                 let handle_of = |local: usize| self.works[work.members[local]].handle;
                 list_contacts(work, &self.scene, handle_of, &mut self.contacts);
+                add_attachment_forces(work, deformables);
             }
             for (problem, &index) in work.island.bodies.drain(..).zip(&work.members) {
                 self.works[index].problem = Some(problem);
             }
         }
+        deformables.attachments_mut().for_each(DeformableAttachment::end_step);
         self.counters.active_contacts = self.contacts.iter().filter(|c| c.force != Vector::ZERO).count();
         self.idle.extend(self.works.drain(..).map(|work| (work.handle, work)));
     }
@@ -257,7 +289,7 @@ fn store(
     work.memory_of(local, h, &mut body.state.contacts);
     body.state.closure.clear();
     if local == 0 {
-        work.memory_of_closure(h, &mut body.state.closure);
+        work.memory_of_links(h, &mut body.state.closure);
     }
     body.report.iterations = work.island.report.iterations;
     body.report.residual = problem.residual();
@@ -265,6 +297,16 @@ fn store(
     body.report.guard_retries = problem.guard_retries;
     counters.guard_retries += problem.guard_retries;
     counters.not_converged += usize::from(!body.last_converged());
+}
+
+fn add_attachment_forces(work: &IslandWork, deformables: &mut DeformableBodySet) {
+    let system = &work.island.contacts;
+    for (i, row) in system.rows.iter().enumerate() {
+        let attachment = attachment_of(&row.key).map(DeformableAttachmentHandle);
+        if let Some(attachment) = attachment.and_then(|handle| deformables.attachment_mut(handle)) {
+            attachment.force += system.force(i);
+        }
+    }
 }
 
 fn list_contacts(
@@ -278,6 +320,9 @@ fn list_contacts(
         let [Side::Soft { body, .. }, Side::Partner { point, .. }] = &row.sides else {
             continue;
         };
+        if row.key.is_link() {
+            continue;
+        }
         let normal: &Vec3 = &row.frame[0];
         contacts.push(DeformableContact {
             body: handle_of(*body),

@@ -20,6 +20,8 @@ pub(super) struct BodyWork {
     /// Surface nodes in the order in which they are expected to touch.
     pub ahead: Vec<u32>,
     distances: Vec<(f32, u32)>,
+    /// Nodes that attachments act on.
+    pub tied: Vec<u32>,
 }
 
 /// How far a body that touches nothing looks ahead \[s\].
@@ -37,6 +39,7 @@ impl BodyWork {
             near: Vec::new(),
             ahead: Vec::new(),
             distances: Vec::new(),
+            tied: Vec::new(),
         }
     }
 
@@ -100,6 +103,16 @@ impl BodyWork {
         self.ahead.extend(self.distances.iter().map(|(_, s)| *s));
     }
 
+    /// Takes another place in the step's list.
+    pub fn move_to(&mut self, place: usize) {
+        self.index = place;
+        for side in self.rows.iter_mut().flat_map(|row| &mut row.sides) {
+            if let Side::Soft { body, .. } = side {
+                *body = place;
+            }
+        }
+    }
+
     /// Tells where the body's factor is kept in this step.
     pub fn set_factor(&mut self, id: FactorId) {
         if let Some(problem) = &mut self.problem {
@@ -109,9 +122,10 @@ impl BodyWork {
 
     /// Surface nodes (as indices into the model's list) that the contacts act on.
     pub fn touched_nodes(&self) -> impl Iterator<Item = u32> + '_ {
-        let nodes = self.rows.iter().flat_map(|row| row.sides[0].soft_nodes());
+        let nodes = self.rows.iter().flat_map(|row| row.sides[0].soft_nodes()).map(|(node, _)| node);
         let index = self.problem.as_ref().map(|p| &p.model.surface.index_of_node);
-        nodes.filter_map(move |(node, _)| Some(index?[node]))
+        let tied = self.tied.iter().map(|node| *node as usize);
+        nodes.chain(tied).filter_map(move |node| Some(index?[node]))
     }
 }
 
@@ -138,15 +152,27 @@ impl IslandWork {
         }
     }
 
+    /// Takes over a row between members or partners of the island.
+    pub fn take_in_link(&mut self, mut row: Row) {
+        for side in &mut row.sides {
+            if let Side::Soft { body, .. } = side {
+                // Members are in ascending order.
+                let Ok(local) = self.members.binary_search(body) else { return };
+                *body = local;
+            }
+        }
+        self.island.contacts.rows.push(row);
+    }
+
     /// Whether every number that leaves the island is finite.
     pub fn is_finite(&self) -> bool {
         self.island.bodies.iter().all(|b| b.current.x.iter().all(is_number))
             && self.island.contacts.lambda.iter().all(|l| l.is_finite())
     }
 
-    /// Gives the rows between rigid bodies the forces that a member remembers.
-    pub fn recall_closure(&mut self, state: &DeformableState) {
-        for row in self.island.contacts.rows.iter_mut().filter(|row| row.is_closure()) {
+    /// Gives closure and attachments the forces that a member remembers.
+    pub fn recall_links(&mut self, state: &DeformableState) {
+        for row in self.island.contacts.rows.iter_mut().filter(|row| row.key.is_link()) {
             if let Some(memory) = state.closure_row(&row.key) {
                 row.warm_force = memory.force;
                 row.warm_shift_rate = memory.shift_rate;
@@ -154,11 +180,11 @@ impl IslandWork {
         }
     }
 
-    /// What the rows between rigid bodies leave to the next step, ascending by key.
-    pub fn memory_of_closure(&self, h: f64, memory: &mut Vec<ContactMemory>) {
+    /// What closure and attachments leave to the next step, ascending by key.
+    pub fn memory_of_links(&self, h: f64, memory: &mut Vec<ContactMemory>) {
         memory.clear();
         let contacts = &self.island.contacts;
-        for (i, row) in contacts.rows.iter().enumerate().filter(|(_, row)| row.is_closure()) {
+        for (i, row) in contacts.rows.iter().enumerate().filter(|(_, row)| row.key.is_link()) {
             let force = contacts.force(i);
             if force != Vec3::zeros() {
                 let shift_rate = contacts.shift[i] / h;
@@ -181,7 +207,7 @@ impl IslandWork {
         for (i, row) in contacts.rows.iter().enumerate() {
             let Side::Soft { body, nodes, weights } = row.sides[0] else { continue };
             let force = contacts.force(i);
-            if body == member && force != Vec3::zeros() {
+            if body == member && !row.key.is_link() && force != Vec3::zeros() {
                 let shift_rate = contacts.shift[i] / h;
                 memory.push(ContactMemory { key: row.key, force, shift_rate, nodes, weights });
             }

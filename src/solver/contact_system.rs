@@ -225,7 +225,8 @@ impl ContactSystem {
             let motions = row.directions().iter().map(|d| d.dot(&moved)).zip(of_forces);
             let first = self.g_free.len();
             self.g_free.extend(motions.map(|(motion, by_forces)| motion - by_forces));
-            self.g_free[first] += goal;
+            // What the row itself gives way by is no motion of its ends.
+            self.g_free[first] += goal + row.compliance * self.lambda[first];
         }
         self.reactions = reactions;
         self.before.clone_from(&self.lambda);

@@ -1,0 +1,173 @@
+//! Vertices tied to rigid bodies, to the world, or to other deformable bodies.
+
+use super::body::BodyError;
+use super::set::{DeformableBodyHandle, DeformableBodySet};
+use crate::error::DeformableBodyError;
+use crate::math::{Pose64, Vec3, to_real};
+use rapier3d::dynamics::RigidBodyHandle;
+use rapier3d::math::{Pose, Vector};
+
+/// Names an attachment of a [`DeformableBodySet`]; never used again after its removal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct DeformableAttachmentHandle(pub(crate) u64);
+
+/// What vertices are tied to.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum AttachTo {
+    /// The world: where the vertices are now. [`DeformableAttachment::translate`] moves them.
+    World,
+    /// A rigid body or multibody link, at the places that the vertices have on it now, given its pose.
+    RigidBody(RigidBodyHandle, Pose),
+    /// Vertices of another deformable body, one by one: they are drawn together.
+    Deformable(DeformableBodyHandle, Vec<usize>),
+}
+
+/// Vertices of a body tied to something. Hard, unless given a compliance.
+#[derive(Clone, Debug)]
+pub struct DeformableAttachment {
+    pub(crate) body: DeformableBodyHandle,
+    /// Nodes of the body.
+    pub(crate) nodes: Vec<u32>,
+    pub(crate) anchors: Anchors,
+    compliance: f64,
+    break_force: f64,
+    pub(crate) force: Vec3,
+    pub(crate) broken: bool,
+}
+
+/// Where the nodes are tied.
+#[derive(Clone, Debug)]
+pub(crate) enum Anchors {
+    World(Vec<Vec3>),
+    /// In the body's frame.
+    Rigid(RigidBodyHandle, Vec<Vec3>),
+    /// Nodes of the other body.
+    Deformable(DeformableBodyHandle, Vec<u32>),
+}
+
+impl DeformableAttachment {
+    /// Whether it is of this body, or to it.
+    pub(super) fn ties(&self, body: DeformableBodyHandle) -> bool {
+        self.body == body || matches!(self.anchors, Anchors::Deformable(other, _) if other == body)
+    }
+
+    /// The body whose vertices are tied.
+    pub fn body(&self) -> DeformableBodyHandle {
+        self.body
+    }
+
+    /// Displacement per force that each vertex gives way by [m/N]; zero is hard.
+    pub fn compliance(&self) -> f64 {
+        self.compliance
+    }
+
+    /// Changes the compliance [m/N]; negative values and NaN are taken for zero.
+    pub fn set_compliance(&mut self, compliance: f64) {
+        self.compliance = compliance.max(0.0);
+    }
+
+    /// Total force \[N\] at which the attachment breaks; infinite if it does not.
+    pub fn break_force(&self) -> f64 {
+        self.break_force
+    }
+
+    /// Changes the breaking force \[N\].
+    pub fn set_break_force(&mut self, force: f64) {
+        self.break_force = force;
+    }
+
+    /// Force \[N\] on the body in the last step, summed over its vertices.
+    pub fn force(&self) -> Vector {
+        to_real(&self.force)
+    }
+
+    /// Whether it has broken; it does nothing then, until it is mended.
+    pub fn is_broken(&self) -> bool {
+        self.broken
+    }
+
+    /// Makes a broken attachment whole.
+    pub fn mend(&mut self) {
+        self.broken = false;
+    }
+
+    /// Moves the places in the world, or on the rigid body in its frame, by `by` \[m\]. Does nothing to
+    /// attachments between deformable bodies.
+    pub fn translate(&mut self, by: Vector) {
+        let by = crate::math::from_real(by);
+        match &mut self.anchors {
+            Anchors::World(points) | Anchors::Rigid(_, points) => points.iter_mut().for_each(|p| *p += by),
+            Anchors::Deformable(..) => {}
+        }
+    }
+
+    /// Takes in the force of a step; tells nothing of it to the body.
+    pub(crate) fn end_step(&mut self) {
+        if self.force.norm() > self.break_force {
+            self.broken = true;
+        }
+    }
+}
+
+impl DeformableBodySet {
+    /// Ties surface vertices of a body to something, where they are now.
+    ///
+    /// # Errors
+    /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody); [`BodyError::NoSuchVertex`];
+    /// [`BodyError::NotOnSurface`] for vertices inside of a body, which can be pinned but not attached;
+    /// [`BodyError::NoVertices`]; [`BodyError::WrongSize`] if the two lists of vertices differ in length.
+    pub fn attach(
+        &mut self,
+        body: DeformableBodyHandle,
+        vertices: &[usize],
+        to: AttachTo,
+    ) -> Result<DeformableAttachmentHandle, DeformableBodyError> {
+        let nodes = self.surface_nodes(body, vertices)?;
+        let x = |node: &u32| self[body].state.x[*node as usize];
+        let anchors = match to {
+            AttachTo::World => Anchors::World(nodes.iter().map(x).collect()),
+            AttachTo::RigidBody(handle, pose) => {
+                let pose = Pose64::from_real(&pose);
+                Anchors::Rigid(handle, nodes.iter().map(|n| pose.inverse_transform(&x(n))).collect())
+            }
+            AttachTo::Deformable(other, others) => {
+                if others.len() != nodes.len() {
+                    let error = BodyError::WrongSize { vertices: others.len(), expected: nodes.len() };
+                    return Err(error.into());
+                }
+                Anchors::Deformable(other, self.surface_nodes(other, &others)?)
+            }
+        };
+        let attachment = DeformableAttachment {
+            body,
+            nodes,
+            anchors,
+            compliance: 0.0,
+            break_force: f64::INFINITY,
+            force: Vec3::zeros(),
+            broken: false,
+        };
+        Ok(self.insert_attachment(attachment))
+    }
+
+    fn surface_nodes(
+        &self,
+        handle: DeformableBodyHandle,
+        vertices: &[usize],
+    ) -> Result<Vec<u32>, DeformableBodyError> {
+        let body = self.get(handle).ok_or_else(|| handle.no_such_body())?;
+        if vertices.is_empty() {
+            return Err(BodyError::NoVertices { quantity: "attachment" }.into());
+        }
+        let mut nodes = Vec::with_capacity(vertices.len());
+        for &vertex in vertices {
+            let node = body.node(vertex)?;
+            if body.model.surface.index_of_node[node] == u32::MAX {
+                return Err(BodyError::NotOnSurface { vertex }.into());
+            }
+            nodes.push(node as u32);
+        }
+        Ok(nodes)
+    }
+}

@@ -1,0 +1,136 @@
+//! Vertices tied to the world, to rigid bodies and links, and to one another.
+mod common;
+use common::*;
+use foible3d::prelude::*;
+use rapier3d::prelude::*;
+
+const SETTLED: usize = 300;
+
+fn slab() -> DeformableBodyBuilder {
+    DeformableBodyBuilder::cuboid(Vector::new(0.2, 0.05, 0.05), [8, 2, 2])
+        .material(DeformableMaterial::new(1e6, 0.3).mass_damping(5.0))
+}
+
+fn left(body: &DeformableBody) -> Vec<usize> {
+    at_rest_where(body, |x| x[0] < -0.199)
+}
+
+fn right(body: &DeformableBody) -> Vec<usize> {
+    at_rest_where(body, |x| x[0] > 0.199)
+}
+
+#[test]
+fn tied_to_the_world_is_as_good_as_pinned() {
+    let mut physics = PhysicsWorld::new();
+    let mut world = DeformableWorld::new();
+    let pinned = world.insert(slab().pinned(|x| x.x < -0.199)).unwrap();
+    let tied = world.insert(slab().translation(Vector::Z)).unwrap();
+    let ends = left(&world.bodies[tied]);
+    let attachment = world.bodies.attach(tied, &ends, AttachTo::World).unwrap();
+    for _ in 0..SETTLED {
+        world.step(&mut physics);
+    }
+    let weight = world.bodies[tied].mass() * G;
+    let force = world.bodies.attachment(attachment).unwrap().force();
+    assert!((f64::from(force.y) / weight - 1.0).abs() < 1e-4, "{force} of {weight} N");
+    let tip = |b| mean_position(&world.bodies[b], &right(&world.bodies[b]))[1];
+    // Not quite the same: tied vertices are solved for to 1e-8 of the force, pinned ones are not unknowns.
+    assert!((tip(tied) / tip(pinned) - 1.0).abs() < 1e-3, "{} {}", tip(tied), tip(pinned));
+    // Moved along with what it is tied to, and let go.
+    world.bodies.attachment_mut(attachment).unwrap().translate(Vector::Y * 0.2);
+    (0..SETTLED).for_each(|_| world.step(&mut physics));
+    let end = mean_position(&world.bodies[tied], &ends);
+    assert!((end[1] - 0.2).abs() < 1e-5, "{end:?}");
+    assert!(world.bodies.detach(attachment).is_some() && world.bodies.detach(attachment).is_none());
+    (0..60).for_each(|_| world.step(&mut physics));
+    assert!(world.bodies[tied].center_of_mass()[1] < -1.0);
+}
+
+#[test]
+fn a_box_hangs_on_a_strap_and_a_compliant_one_gives_way() {
+    for compliance in [0.0, 1e-3] {
+        let mut physics = PhysicsWorld::new();
+        let body = RigidBodyBuilder::dynamic().translation(Vector::X * 0.35).can_sleep(false);
+        let (load, _) = physics.insert(body, ColliderBuilder::cuboid(0.1, 0.1, 0.1).density(250.0));
+        let mut world = DeformableWorld::new();
+        let strap = slab().pinned(|x| x.x < -0.199).collision_groups(InteractionGroups::none());
+        let strap = world.insert(strap).unwrap();
+        let pose = *physics.bodies[load].position();
+        let ends = right(&world.bodies[strap]);
+        let attachment = world.bodies.attach(strap, &ends, AttachTo::RigidBody(load, pose)).unwrap();
+        world.bodies.attachment_mut(attachment).unwrap().set_compliance(compliance);
+        for _ in 0..900 {
+            world.step(&mut physics);
+        }
+        let rigid = &physics.bodies[load];
+        let weight = f64::from(rigid.mass()) * G;
+        let force = f64::from(world.bodies.attachment(attachment).unwrap().force().y);
+        println!("compliance {compliance}: {force} N, {:e} m/s", rigid.linvel().length());
+        assert!((force / -weight - 1.0).abs() < 1e-3, "{force} N of {weight} N");
+        // Where the vertices are against their places on the box: by C f each.
+        let local: Vec<[f64; 3]> = ends
+            .iter()
+            .map(|&v| world.bodies[strap].position(v).unwrap())
+            .zip(&ends)
+            .map(|(p, &v)| {
+                let rest = world.bodies[strap].model().rest_position(v);
+                let at = Vector::new(rest[0] as f32 - 0.35, rest[1] as f32, rest[2] as f32);
+                let place = rigid.position().transform_point(at);
+                [p[0] - f64::from(place.x), p[1] - f64::from(place.y), p[2] - f64::from(place.z)]
+            })
+            .collect();
+        let mean = local.iter().map(|d| d[1]).sum::<f64>() / local.len() as f64;
+        let expected = compliance * weight / ends.len() as f64;
+        assert!((mean - expected).abs() < 1e-4 + 0.01 * expected, "{mean} m, {expected} m");
+    }
+}
+
+#[test]
+fn an_overloaded_attachment_breaks() {
+    let mut physics = PhysicsWorld::new();
+    let mut world = DeformableWorld::new();
+    let body = world.insert(slab()).unwrap();
+    let ends = left(&world.bodies[body]);
+    let attachment = world.bodies.attach(body, &ends, AttachTo::World).unwrap();
+    let weight = world.bodies[body].mass() * G;
+    world.bodies.attachment_mut(attachment).unwrap().set_break_force(0.5 * weight);
+    (0..60).for_each(|_| world.step(&mut physics));
+    assert!(world.bodies.attachment(attachment).unwrap().is_broken());
+    assert!(world.bodies[body].center_of_mass()[1] < -1.0);
+}
+
+#[test]
+fn two_bodies_tied_end_to_end_hang_as_one() {
+    let mut physics = PhysicsWorld::new();
+    let mut world = DeformableWorld::new();
+    let first = world.insert(slab().pinned(|x| x.x < -0.199)).unwrap();
+    let second = world.insert(slab().translation(Vector::X * 0.4)).unwrap();
+    let (ends, starts) = (right(&world.bodies[first]), left(&world.bodies[second]));
+    // The lattices agree, so do the orders of their vertices.
+    let attachment = world.bodies.attach(first, &ends, AttachTo::Deformable(second, starts.clone())).unwrap();
+    for _ in 0..900 {
+        world.step(&mut physics);
+    }
+    let weight = world.bodies[second].mass() * G;
+    let force = f64::from(world.bodies.attachment(attachment).unwrap().force().y);
+    assert!((force / -weight - 1.0).abs() < 1e-3, "{force} N of {weight} N");
+    for (a, b) in ends.iter().zip(&starts) {
+        let (p, q) = (world.bodies[first].position(*a).unwrap(), world.bodies[second].position(*b).unwrap());
+        let apart = (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
+        assert!(apart < 1e-6, "{apart:e} m apart");
+    }
+}
+
+#[test]
+fn vertices_that_cannot_be_attached_are_named() {
+    let mut world = DeformableWorld::new();
+    let body = world.insert(cube(DeformableMaterial::new(1e6, 0.3), 1.0)).unwrap();
+    let inside = at_rest_where(&world.bodies[body], |x| x.iter().all(|c| c.abs() < 0.01));
+    let error = |vertices: &[usize], world: &mut DeformableWorld| {
+        world.bodies.attach(body, vertices, AttachTo::World).unwrap_err().to_string()
+    };
+    assert!(error(&inside, &mut world).contains("not on the surface"));
+    assert!(error(&[100_000], &mut world).contains("100000"));
+    assert!(error(&[], &mut world).contains("empty"));
+    assert_eq!(world.bodies.attachments().count(), 0);
+}
