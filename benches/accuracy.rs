@@ -12,6 +12,7 @@ fn run(e: f64, nu: f64, settings: SolverSettings) -> (Vec<f64>, f64) {
     let mut physics = PhysicsWorld::new();
     let mut world = DeformableWorld::new();
     let beam = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.05, 0.05), [20, 2, 2])
+        .can_sleep(false)
         .material(DeformableMaterial::new(e, nu))
         .settings(settings)
         .pinned(|x| x.x < -0.4999);

@@ -98,6 +98,7 @@ fn run_foible(items: &[Item], floor: bool, steps: usize) -> Outcome {
             let left = item.at[0] - item.half[0] as f32 + 1e-5;
             let clamped = item.clamped;
             let builder = DeformableBodyBuilder::mesh(&item.mesh())
+                .can_sleep(false)
                 .translation(item.at.into())
                 .rotation(item.turn)
                 .material(DeformableMaterial::new(item.e, item.nu).mass_damping(item.damping))
@@ -292,6 +293,7 @@ fn static_tip(item: &Item) -> f64 {
     physics.integration_parameters.dt = 0.1;
     let mut world = DeformableWorld::new();
     let builder = DeformableBodyBuilder::mesh(&item.mesh())
+        .can_sleep(false)
         .material(DeformableMaterial::new(item.e, item.nu).mass_damping(5.0))
         .settings(SolverSettings { max_iterations: 100, tolerance: 1e-8, ..SolverSettings::default() })
         .pinned(|x| x.x < -0.4999);

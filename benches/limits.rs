@@ -39,6 +39,7 @@ fn beam(cells: [usize; 3], precision: FactorPrecision) {
     let mut world = DeformableWorld::new();
     let settings = SolverSettings { precision, ..SolverSettings::default() };
     let builder = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.1, 0.1), cells)
+        .can_sleep(false)
         .material(DeformableMaterial::new(1e6, 0.3).mass_damping(5.0))
         .settings(settings)
         .pinned(|x| x.x < -0.4999);
@@ -72,6 +73,7 @@ fn landing(count: usize, threads: usize) -> f64 {
         let mesh = TetMesh::cuboid([0.2, 0.25, 0.2], [4, 6, 4]).expect("a valid lattice");
         for k in 0..count {
             let builder = DeformableBodyBuilder::mesh(&mesh)
+                .can_sleep(false)
                 .translation(Vector::new((k % 8) as f32, 0.5, (k / 8) as f32))
                 .rotation(Vector::new(0.1, 0.2, 0.3))
                 .material(DeformableMaterial::new(1e6, 0.3));
@@ -91,7 +93,7 @@ fn landing(count: usize, threads: usize) -> f64 {
 fn memory(tets: usize, cells: usize) {
     let mut physics = PhysicsWorld::new();
     let mut world = DeformableWorld::new();
-    let builder = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [cells; 3]);
+    let builder = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [cells; 3]).can_sleep(false);
     let body = world.insert(builder).expect("a valid cube");
     world.step(&mut physics);
     let factor = world.counters().factor_bytes;

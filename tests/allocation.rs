@@ -72,12 +72,14 @@ fn allocations(
 
 fn cube(e: f64, at: Vector) -> DeformableBodyBuilder {
     DeformableBodyBuilder::cuboid(Vector::splat(0.2), [4; 3])
+        .can_sleep(false)
         .material(DeformableMaterial::new(e, 0.3))
         .translation(at)
 }
 
 fn beam() -> DeformableBodyBuilder {
     DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.05, 0.05), [16, 2, 2])
+        .can_sleep(false)
         .material(DeformableMaterial::new(1e6, 0.3))
         .translation(Vector::Y * 3.0)
 }

@@ -8,6 +8,7 @@ const SETTLED: usize = 300;
 
 fn slab() -> DeformableBodyBuilder {
     DeformableBodyBuilder::cuboid(Vector::new(0.2, 0.05, 0.05), [8, 2, 2])
+        .can_sleep(false)
         .material(DeformableMaterial::new(1e6, 0.3).mass_damping(5.0))
 }
 

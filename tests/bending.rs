@@ -9,6 +9,7 @@ fn falling_tip(e: f64, nu: f64, settings: SolverSettings, seconds: f32) -> Vec<f
     let mut physics = PhysicsWorld::new();
     let mut world = DeformableWorld::new();
     let beam = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.05, 0.05), [20, 2, 2])
+        .can_sleep(false)
         .material(DeformableMaterial::new(e, nu))
         .settings(settings)
         .pinned(|x| x.x < -0.4999);
@@ -55,6 +56,7 @@ fn let_go(shape: impl Fn([f64; 3]) -> [f64; 3], e: f64, settings: SolverSettings
     physics.gravity = Vector::ZERO;
     let mut world = DeformableWorld::new();
     let bar = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.05, 0.05), [20, 2, 2])
+        .can_sleep(false)
         .material(DeformableMaterial::new(e, 0.3))
         .settings(settings);
     let bar = world.insert(bar).unwrap();
@@ -134,6 +136,7 @@ fn axial_wave_has_the_period_of_a_fixed_free_bar() {
     physics.integration_parameters.dt = dt;
     let mut world = DeformableWorld::new();
     let bar = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.05, 0.05), [20, 2, 2])
+        .can_sleep(false)
         .material(DeformableMaterial::new(e, 0.0))
         .pinned(|x| x.x < -0.4999);
     let bar = world.insert(bar).unwrap();

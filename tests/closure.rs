@@ -114,6 +114,7 @@ fn a_hinged_lid_presses_on_a_cube_with_its_moment() {
     physics.impulse_joints.insert(post, lid, hinge, true);
     let mut world = DeformableWorld::new();
     let small = DeformableBodyBuilder::cuboid(Vector::new(0.05, 0.2, 0.05), [2, 6, 2])
+        .can_sleep(false)
         .translation(Vector::new(0.2, 0.2, 0.0))
         .material(DeformableMaterial::new(1e6, 0.3).friction(MU));
     let body = world.insert(small).unwrap();
@@ -185,6 +186,7 @@ fn a_cube_dropped_on_a_free_link_turns_it_like_a_rigid_one() {
         let mut cube = None;
         if soft {
             let builder = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [3; 3])
+                .can_sleep(false)
                 .translation(at)
                 .linvel(Vector::Y * -2.0)
                 .material(DeformableMaterial::new(1e6, 0.3).friction(MU));
@@ -221,6 +223,7 @@ fn an_arm_presses_a_pad_with_its_motors_torque() {
     motor.set_motor_max_force(JointAxis::AngX, 30.0);
     let mut world = DeformableWorld::new();
     let pad = DeformableBodyBuilder::cuboid(Vector::new(0.05, 0.1, 0.05), [2, 4, 2])
+        .can_sleep(false)
         .translation(Vector::new(0.8, -0.151, 0.0))
         .material(DeformableMaterial::new(1e6, 0.3).friction(MU));
     let pad = world.insert(pad).unwrap();

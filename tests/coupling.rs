@@ -6,6 +6,7 @@ use rapier3d::prelude::*;
 
 fn small_cube(at: Vector) -> DeformableBodyBuilder {
     DeformableBodyBuilder::cuboid(Vector::splat(0.1), [3, 3, 3])
+        .can_sleep(false)
         .translation(at)
         .material(DeformableMaterial::new(1e6, 0.3).friction(MU))
 }

@@ -12,6 +12,7 @@ fn scene() -> (PhysicsWorld, DeformableWorld) {
     let mut world = DeformableWorld::new();
     for (k, x) in [-0.25f32, 0.25, 2.0].into_iter().enumerate() {
         let body = DeformableBodyBuilder::cuboid(Vector::splat(0.15), [3, 4, 3])
+            .can_sleep(false)
             .translation(Vector::new(x, 0.2, 0.0))
             .rotation(Vector::new(0.1, 0.2, 0.3) * k as f32)
             .material(DeformableMaterial::new(1e5 * (k + 1) as f64, 0.35).friction(MU));

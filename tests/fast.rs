@@ -39,6 +39,7 @@ fn a_bullet_does_not_pass_a_soft_wall() {
         let (ball, _) = physics.insert(ball.ccd_enabled(true).can_sleep(false), shape);
         let mut world = DeformableWorld::new();
         let wall = DeformableBodyBuilder::cuboid(Vector::new(0.05, 0.3, 0.3), [2, 8, 8])
+            .can_sleep(false)
             .material(DeformableMaterial::new(1e6, 0.3).friction(MU))
             .pinned(|x| x.y.abs() > 0.29 || x.z.abs() > 0.29);
         let wall = world.insert(wall).unwrap();

@@ -94,6 +94,7 @@ fn box_on_a_slope_tips_when_tan_theta_exceeds_width_over_height() {
         let mut world = DeformableWorld::new();
         let rotation = Rotation::from_scaled_axis(turn);
         let body = DeformableBodyBuilder::cuboid(Vector::new(0.1, 0.2, 0.1), [2, 4, 2])
+            .can_sleep(false)
             .pose(Pose::from_parts(rotation * Vector::new(0.0, 0.2, 0.0), rotation))
             .material(DeformableMaterial::new(1e8, 0.3).friction(2.0));
         let body = world.insert(body).unwrap();

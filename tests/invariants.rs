@@ -57,7 +57,11 @@ fn inverted_cube_recovers() {
             .mass_damping(2.0)
             .stiffness_damping(0.005);
         let body = world
-            .insert(DeformableBodyBuilder::cuboid(Vector::splat(0.2), [3, 3, 3]).material(material))
+            .insert(
+                DeformableBodyBuilder::cuboid(Vector::splat(0.2), [3, 3, 3])
+                    .can_sleep(false)
+                    .material(material),
+            )
             .unwrap();
         let b = &mut world.bodies[body];
         for v in 0..b.vertex_count() {
@@ -137,7 +141,7 @@ fn bad_requests_are_named_and_change_nothing() {
     world.remove(body).unwrap();
     let gone = world.remove(body).unwrap_err();
     assert!(matches!(gone, DeformableBodyError::Handle(HandleError::NoSuchBody { .. })), "{gone}");
-    let bad = DeformableBodyBuilder::cuboid(Vector::new(0.1, 0.0, 0.1), [1, 1, 1]);
+    let bad = DeformableBodyBuilder::cuboid(Vector::new(0.1, 0.0, 0.1), [1, 1, 1]).can_sleep(false);
     let error = world.insert(bad).unwrap_err().to_string();
     assert!(error.contains("half extents"), "{error}");
 }
@@ -194,7 +198,7 @@ proptest! {
         let mut world = DeformableWorld::new();
         for (x, y, z, e, speed) in places {
             // Overlaps with the floor, with the ball and with one another included.
-            let body = DeformableBodyBuilder::cuboid(Vector::new(0.2, 0.1, 0.15), [2, 2, 2])
+            let body = DeformableBodyBuilder::cuboid(Vector::new(0.2, 0.1, 0.15), [2, 2, 2]).can_sleep(false)
                 .translation(Vector::new(x, y, z))
                 .linvel(Vector::new(speed, -speed, 0.0))
                 .material(DeformableMaterial::new(e, 0.4));

@@ -11,6 +11,7 @@ fn settle(collider: ColliderBuilder) -> (f64, f64, f64) {
     let (_, collider) = physics.insert(RigidBodyBuilder::fixed(), collider.friction(1.0));
     let mut world = DeformableWorld::new();
     let body = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [3, 3, 3])
+        .can_sleep(false)
         .translation(Vector::Y * 0.12)
         .material(DeformableMaterial::new(1e5, 0.3).friction(1.0).mass_damping(4.0));
     let body = world.insert(body).unwrap();

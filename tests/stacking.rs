@@ -57,6 +57,7 @@ fn small_box_and_ball_do_not_sink_between_the_nodes() {
         let (mut physics, _) = world_with_floor(1.0 / 60.0);
         let mut world = DeformableWorld::new();
         let slab = DeformableBodyBuilder::cuboid(Vector::new(0.2, 0.1, 0.2), [3, 2, 3])
+            .can_sleep(false)
             .translation(Vector::Y * 0.1)
             .material(DeformableMaterial::new(1e5, 0.3).friction(MU));
         let slab = world.insert(slab).unwrap();

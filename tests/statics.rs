@@ -26,6 +26,7 @@ fn settled_tip(e: f64, dt: f32, cells: [usize; 3]) -> f64 {
     physics.integration_parameters.dt = dt;
     let mut world = DeformableWorld::new();
     let beam = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.1, 0.1), cells)
+        .can_sleep(false)
         .material(DeformableMaterial::new(e, 0.3).mass_damping(8.0))
         .pinned(|x| x.x < -0.4999);
     let beam = world.insert(beam).unwrap();
@@ -74,6 +75,7 @@ fn uniform_column_shortens_by_its_own_weight() {
     let mut physics = PhysicsWorld::new();
     let mut world = DeformableWorld::new();
     let column = DeformableBodyBuilder::cuboid(Vector::new(0.1, 0.25, 0.1), [2, 10, 2])
+        .can_sleep(false)
         .material(DeformableMaterial::new(1e6, 0.0).mass_damping(8.0))
         .pinned(|x| x.y < -0.2499);
     let column = world.insert(column).unwrap();

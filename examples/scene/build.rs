@@ -121,7 +121,9 @@ fn deformable(body: &file::Deformable, folder: &Path) -> DeformableBodyBuilder {
         .linvel(body.linvel.into())
         .angvel(body.angvel.into())
         .material(body.material.as_ref().to_material())
-        .settings(settings);
+        .settings(settings)
+        // What a scene expects of rest is to be found awake.
+        .can_sleep(false);
     match body.pinned {
         Some(region) => {
             let (low, high) = (Vector::from(region.min), Vector::from(region.max));

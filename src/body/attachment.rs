@@ -34,6 +34,8 @@ pub struct DeformableAttachment {
     break_force: f64,
     pub(crate) force: Vec3,
     pub(crate) broken: bool,
+    /// Something was changed since the last step.
+    changed: bool,
 }
 
 /// Where the nodes are tied.
@@ -65,6 +67,7 @@ impl DeformableAttachment {
     /// Changes the compliance [m/N]; negative values and NaN are taken for zero.
     pub fn set_compliance(&mut self, compliance: f64) {
         self.compliance = compliance.max(0.0);
+        self.changed = true;
     }
 
     /// Total force \[N\] at which the attachment breaks; infinite if it does not.
@@ -90,11 +93,13 @@ impl DeformableAttachment {
     /// Makes a broken attachment whole.
     pub fn mend(&mut self) {
         self.broken = false;
+        self.changed = true;
     }
 
     /// Moves the places in the world, or on the rigid body in its frame, by `by` \[m\]. Does nothing to
     /// attachments between deformable bodies.
     pub fn translate(&mut self, by: Vector) {
+        self.changed = true;
         let by = crate::math::from_real(by);
         match &mut self.anchors {
             Anchors::World(points) | Anchors::Rigid(_, points) => points.iter_mut().for_each(|p| *p += by),
@@ -102,7 +107,27 @@ impl DeformableAttachment {
         }
     }
 
-    /// Takes in the force of a step; tells nothing of it to the body.
+    /// The bodies that it ties, if something was changed since this was asked last.
+    pub(crate) fn take_changed(&mut self) -> [Option<DeformableBodyHandle>; 2] {
+        if !std::mem::take(&mut self.changed) {
+            return [None; 2];
+        }
+        let other = match self.anchors {
+            Anchors::Deformable(other, _) => Some(other),
+            Anchors::World(_) | Anchors::Rigid(..) => None,
+        };
+        [Some(self.body), other]
+    }
+
+    /// The rigid body that it ties to.
+    pub(crate) fn rigid(&self) -> Option<RigidBodyHandle> {
+        match self.anchors {
+            Anchors::Rigid(handle, _) => Some(handle),
+            Anchors::World(_) | Anchors::Deformable(..) => None,
+        }
+    }
+
+    /// Takes in the force of a step.
     pub(crate) fn end_step(&mut self) {
         if self.force.norm() > self.break_force {
             self.broken = true;
@@ -147,6 +172,7 @@ impl DeformableBodySet {
             break_force: f64::INFINITY,
             force: Vec3::zeros(),
             broken: false,
+            changed: true,
         };
         Ok(self.insert_attachment(attachment))
     }

@@ -3,6 +3,7 @@
 use super::elastic;
 use super::model::DeformableModel;
 use super::settings::SolverSettings;
+use super::sleep::Sleep;
 use super::state::{ContactMemory, DeformableState};
 use crate::material::{DeformableMaterial, MaterialError};
 use crate::math::{Pose64, Vec3, from_real, to_real};
@@ -95,6 +96,7 @@ pub struct DeformableBody {
     settings: SolverSettings,
     gravity_scale: f64,
     enabled: bool,
+    pub(super) can_sleep: bool,
     collision_groups: InteractionGroups,
     friction_combine_rule: CoefficientCombineRule,
     restitution_combine_rule: CoefficientCombineRule,
@@ -109,6 +111,7 @@ impl DeformableBody {
             v: vec![Vec3::zeros(); model.rest.len()],
             contacts: Vec::new(),
             closure: Vec::new(),
+            sleep: Sleep::default(),
         };
         Self {
             model,
@@ -120,6 +123,7 @@ impl DeformableBody {
             settings: SolverSettings::default(),
             gravity_scale: 1.0,
             enabled: true,
+            can_sleep: true,
             collision_groups: InteractionGroups::all(),
             friction_combine_rule: CoefficientCombineRule::Average,
             restitution_combine_rule: CoefficientCombineRule::Average,
@@ -254,6 +258,7 @@ impl DeformableBody {
     /// # Errors
     /// [`BodyError::NotFinite`].
     pub fn set_linvel(&mut self, linvel: Vector) -> Result<(), BodyError> {
+        self.wake_up();
         let linvel = finite("linear velocity", linvel)?;
         self.state.v.fill(linvel);
         Ok(())
@@ -264,6 +269,7 @@ impl DeformableBody {
     /// # Errors
     /// [`BodyError::NotFinite`].
     pub fn set_vels(&mut self, linvel: Vector, angvel: Vector) -> Result<(), BodyError> {
+        self.wake_up();
         let linvel = finite("linear velocity", linvel)?;
         let angvel = finite("angular velocity", angvel)?;
         let centre = self.weighted_mean(&self.state.x);
@@ -278,6 +284,7 @@ impl DeformableBody {
     /// # Errors
     /// [`BodyError::NoSuchVertex`], [`BodyError::NotFinite`].
     pub fn set_velocity(&mut self, vertex: usize, velocity: Vector) -> Result<(), BodyError> {
+        self.wake_up();
         let node = self.node(vertex)?;
         self.state.v[node] = finite("velocity", velocity)?;
         Ok(())
@@ -288,6 +295,7 @@ impl DeformableBody {
     /// # Errors
     /// [`BodyError::NoSuchVertex`], [`BodyError::NotFinite`].
     pub fn set_position(&mut self, vertex: usize, position: [f64; 3]) -> Result<(), BodyError> {
+        self.wake_up();
         let node = self.node(vertex)?;
         finite("position", to_real(&position.into()))?;
         self.state.x[node] = position.into();
@@ -300,6 +308,7 @@ impl DeformableBody {
     /// # Errors
     /// [`BodyError::NotFinite`].
     pub fn teleport(&mut self, by: Pose) -> Result<(), BodyError> {
+        self.wake_up();
         finite("translation", by.translation)?;
         finite("rotation", by.rotation.to_scaled_axis())?;
         let pose = Pose64::from_real(&by);
@@ -318,6 +327,7 @@ impl DeformableBody {
     /// # Errors
     /// [`BodyError::NoSuchVertex`].
     pub fn pin(&mut self, vertex: usize) -> Result<(), BodyError> {
+        self.wake_up();
         let node = self.node(vertex)?;
         let pin = Pin { node: node as u32, target: self.state.x[node], force: Vec3::zeros() };
         match self.pin_place(node) {
@@ -332,6 +342,7 @@ impl DeformableBody {
     /// # Errors
     /// [`BodyError::NoSuchVertex`], [`BodyError::NotPinned`].
     pub fn unpin(&mut self, vertex: usize) -> Result<(), BodyError> {
+        self.wake_up();
         let node = self.node(vertex)?;
         let place = self.pin_place(node);
         self.pins.remove(place.map_err(|_| BodyError::NotPinned { vertex })?);
@@ -343,6 +354,7 @@ impl DeformableBody {
     /// # Errors
     /// [`BodyError::NoSuchVertex`], [`BodyError::NotPinned`], [`BodyError::NotFinite`].
     pub fn move_pin(&mut self, vertex: usize, target: Vector) -> Result<(), BodyError> {
+        self.wake_up();
         let node = self.node(vertex)?;
         let place = self.pin_place(node);
         let place = place.map_err(|_| BodyError::NotPinned { vertex })?;
@@ -369,6 +381,7 @@ impl DeformableBody {
     /// [`BodyError::NoSuchVertex`], [`BodyError::NotFinite`], [`BodyError::NoVertices`]; nothing is
     /// applied then.
     pub fn add_force(&mut self, vertices: &[usize], force: Vector) -> Result<(), BodyError> {
+        self.wake_up();
         let share = self.share("force", vertices, force)?;
         self.forces.resize(self.state.x.len(), Vec3::zeros());
         for &vertex in vertices {
@@ -380,6 +393,7 @@ impl DeformableBody {
 
     /// Removes all forces added so far.
     pub fn reset_forces(&mut self) {
+        self.wake_up();
         self.forces.clear();
     }
 
@@ -388,6 +402,7 @@ impl DeformableBody {
     /// # Errors
     /// As [`DeformableBody::add_force`].
     pub fn apply_impulse(&mut self, vertices: &[usize], impulse: Vector) -> Result<(), BodyError> {
+        self.wake_up();
         let share = self.share("impulse", vertices, impulse)?;
         for &vertex in vertices {
             let node = self.node(vertex)?;
@@ -419,6 +434,7 @@ impl DeformableBody {
     /// # Errors
     /// [`MaterialError`]; the material stays as it was then.
     pub fn set_material(&mut self, material: DeformableMaterial) -> Result<(), MaterialError> {
+        self.wake_up();
         material.validate()?;
         self.material = material;
         Ok(())
@@ -431,6 +447,7 @@ impl DeformableBody {
 
     /// Sets the knobs of the solver; out-of-range ones are brought into range.
     pub fn set_settings(&mut self, settings: SolverSettings) {
+        self.wake_up();
         let mut settings = settings;
         settings.max_iterations = settings.max_iterations.max(1);
         // NaN too becomes zero: iterate to the limit.
@@ -448,6 +465,7 @@ impl DeformableBody {
 
     /// Sets the factor on gravity; a non-finite one is taken as zero.
     pub fn set_gravity_scale(&mut self, scale: f64) {
+        self.wake_up();
         self.gravity_scale = if scale.is_finite() { scale } else { 0.0 };
     }
 
@@ -458,6 +476,7 @@ impl DeformableBody {
 
     /// Takes the body out of the simulation, or back in.
     pub fn set_enabled(&mut self, enabled: bool) {
+        self.wake_up();
         self.enabled = enabled;
         self.report.quarantined &= !enabled;
     }
@@ -475,6 +494,7 @@ impl DeformableBody {
 
     /// Sets which colliders the body collides with.
     pub fn set_collision_groups(&mut self, groups: InteractionGroups) {
+        self.wake_up();
         self.collision_groups = groups;
     }
 
@@ -485,6 +505,7 @@ impl DeformableBody {
 
     /// Sets how friction combines with a collider's.
     pub fn set_friction_combine_rule(&mut self, rule: CoefficientCombineRule) {
+        self.wake_up();
         self.friction_combine_rule = rule;
     }
 
@@ -495,6 +516,7 @@ impl DeformableBody {
 
     /// Sets how restitution combines with a collider's.
     pub fn set_restitution_combine_rule(&mut self, rule: CoefficientCombineRule) {
+        self.wake_up();
         self.restitution_combine_rule = rule;
     }
 

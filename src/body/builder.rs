@@ -38,6 +38,7 @@ pub struct DeformableBodyBuilder {
     pinned: Option<Condition>,
     gravity_scale: f64,
     enabled: bool,
+    can_sleep: bool,
     collision_groups: InteractionGroups,
     friction_combine_rule: CoefficientCombineRule,
     restitution_combine_rule: CoefficientCombineRule,
@@ -88,6 +89,7 @@ impl DeformableBodyBuilder {
             pinned: None,
             gravity_scale: 1.0,
             enabled: true,
+            can_sleep: true,
             collision_groups: InteractionGroups::all(),
             friction_combine_rule: CoefficientCombineRule::Average,
             restitution_combine_rule: CoefficientCombineRule::Average,
@@ -155,6 +157,12 @@ impl DeformableBodyBuilder {
         self
     }
 
+    /// Whether the body may fall asleep when it lies still; it may if not told otherwise.
+    pub fn can_sleep(mut self, can_sleep: bool) -> Self {
+        self.can_sleep = can_sleep;
+        self
+    }
+
     /// Sets which colliders the body collides with.
     pub fn collision_groups(mut self, groups: InteractionGroups) -> Self {
         self.collision_groups = groups;
@@ -191,6 +199,7 @@ impl DeformableBodyBuilder {
         body.set_settings(self.settings);
         body.set_gravity_scale(self.gravity_scale);
         body.set_enabled(self.enabled);
+        body.set_can_sleep(self.can_sleep);
         body.set_collision_groups(self.collision_groups);
         body.set_friction_combine_rule(self.friction_combine_rule);
         body.set_restitution_combine_rule(self.restitution_combine_rule);

@@ -12,6 +12,7 @@ pub(crate) mod elastic;
 mod model;
 mod set;
 mod settings;
+mod sleep;
 mod state;
 
 pub(crate) use attachment::Anchors;
@@ -21,5 +22,6 @@ pub use builder::DeformableBodyBuilder;
 pub use model::DeformableModel;
 pub use set::{DeformableBodyHandle, DeformableBodySet};
 pub use settings::{Acceleration, FactorPrecision, Frames, SolverSettings, SystemMatrix};
+pub(crate) use sleep::{Surroundings, TIME_UNTIL_SLEEP};
 pub use state::DeformableState;
 pub(crate) use state::{ContactKey, ContactMemory, FIRST_LINK_SLOT, is_number};

@@ -67,7 +67,11 @@ impl DeformableBodySet {
 
     /// Removes an attachment; `None` if it was removed before.
     pub fn detach(&mut self, handle: DeformableAttachmentHandle) -> Option<DeformableAttachment> {
-        self.attachments.remove(&handle)
+        let attachment = self.attachments.remove(&handle)?;
+        if let Some(body) = self.get_mut(attachment.body) {
+            body.wake_up();
+        }
+        Some(attachment)
     }
 
     /// The attachment of a handle.

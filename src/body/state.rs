@@ -1,5 +1,6 @@
 //! What changes while a body moves.
 
+use super::sleep::Sleep;
 use crate::math::Vec3;
 
 /// What the motion of a body changes: what a snapshot has to hold beside the user's own settings (pins,
@@ -15,6 +16,7 @@ pub struct DeformableState {
     /// What held the rigid bodies of the island in the last step, ascending by key; with the first body
     /// of the island.
     pub(crate) closure: Vec<ContactMemory>,
+    pub(crate) sleep: Sleep,
 }
 
 /// Names a contact over several steps.

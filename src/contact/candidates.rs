@@ -63,6 +63,12 @@ impl Candidates {
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     }
 
+    /// Obstacles whose boxes come near that of some points, by a tenth of its size.
+    pub fn around(&self, points: &[Vec3], found: &mut Vec<u32>) {
+        let body = Aabb::from_points(points.iter().map(to_real));
+        self.near(&body.loosened(0.1 * body.extents().length()), found);
+    }
+
     /// Obstacles whose boxes meet `aabb`, ascending.
     pub fn near(&self, aabb: &Aabb, found: &mut Vec<u32>) {
         found.clear();

@@ -77,6 +77,15 @@ impl RapierScene {
         ColliderHandle::from_raw_parts((key >> 32) as u32, key as u32)
     }
 
+    /// Whether a rigid body is slow enough to fall asleep, by its own thresholds.
+    pub fn is_still(&self, sets: RapierSets<'_>, handle: RigidBodyHandle) -> bool {
+        sets.bodies.get(handle).is_some_and(|body| {
+            let threshold = body.activation().normalized_linear_threshold;
+            // A tenth of it, as that is what soft bodies are held to.
+            threshold > 0.0 && body.linvel().length().max(body.angvel().length()) < 0.2 * threshold
+        })
+    }
+
     /// A partner that stays where it is.
     pub fn world_partner(&mut self) -> PartnerId {
         let pose = Pose64 { rotation: Mat3::identity(), translation: Vec3::zeros() };

@@ -34,6 +34,7 @@ struct Replaced {
 }
 
 impl Reactions {
+    /// Puts the bodies in `asleep` to sleep.
     /// Hands over the reactions of a step of `dt` \[s\] to the bodies of the scene. Velocities are changed
     /// by the inverse masses that the solve used: rapier's own are zero before its first step.
     pub fn write(
@@ -42,10 +43,16 @@ impl Reactions {
         scene: &RapierScene,
         reactions: &[Reaction],
         closure: &Closure,
+        asleep: &[RigidBodyHandle],
     ) {
         self.replaced.clear();
         self.write_bodies(parts, scene, reactions);
         self.write_links(parts, scene, reactions);
+        for handle in asleep {
+            if let Some(body) = parts.bodies.get_mut(*handle) {
+                body.sleep();
+            }
+        }
         self.still_motors(parts, closure);
     }
 

@@ -28,6 +28,7 @@ impl Grouping {
         self.join(works, links, partners);
         for island in islands.iter_mut() {
             island.members.clear();
+            island.handles.clear();
             island.island.contacts.rows.clear();
         }
         self.island_of_root.clear();

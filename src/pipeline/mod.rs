@@ -5,6 +5,7 @@ mod grouping;
 mod parameters;
 #[allow(clippy::module_inception)]
 mod pipeline;
+mod sleeping;
 mod threads;
 mod work;
 mod world;

@@ -50,6 +50,8 @@ impl DeformableParameters {
 pub struct DeformableCounters {
     /// Bodies stepped.
     pub bodies: usize,
+    /// Bodies that sleep and were not stepped.
+    pub sleeping: usize,
     /// Groups of bodies that were solved independently.
     pub islands: usize,
     /// Colliders (or parts of compounds) read.

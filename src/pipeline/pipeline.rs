@@ -8,6 +8,7 @@
 use super::contacts::DeformableContact;
 use super::grouping::Grouping;
 use super::parameters::{DeformableCounters, DeformableParameters};
+use super::sleeping::Sleeping;
 use super::threads::for_each;
 use super::work::{BodyWork, IslandWork};
 use crate::body::{
@@ -38,6 +39,8 @@ pub struct DeformablePipeline {
     islands: Vec<IslandWork>,
     grouping: Grouping,
     closure: Closure,
+    sleeping: Sleeping,
+    slept: Vec<DeformableBodyHandle>,
     ties: Vec<Row>,
     reaction_list: Vec<Reaction>,
     reactions: Reactions,
@@ -73,6 +76,7 @@ impl DeformablePipeline {
         let sets = parts.sets();
         let mut clock = Clock::start();
         self.read_obstacles(sets, gravity, h);
+        self.sleeping.wake_attached(deformables, sets);
         self.predict(deformables, gravity, h);
         self.detect(deformables, sets);
         self.tie(deformables, sets, gravity, h);
@@ -84,7 +88,9 @@ impl DeformablePipeline {
         self.solve(parameters, h);
         self.counters.solve_time = clock.lap();
         self.advance(deformables, h);
-        self.reactions.write(parts, &self.scene, &self.reaction_list, &self.closure);
+        self.fall_asleep(deformables, sets, gravity, h);
+        let asleep = &self.sleeping.rigid;
+        self.reactions.write(parts, &self.scene, &self.reaction_list, &self.closure, asleep);
         self.counters.advance_time = clock.lap();
     }
 
@@ -132,6 +138,10 @@ impl DeformablePipeline {
             }
             if !body.state.is_finite() {
                 quarantine(body, &mut self.counters);
+                continue;
+            }
+            if self.sleeping.sleeps_on(body, &self.scene, &self.candidates, &from_real(gravity), h) {
+                self.counters.sleeping += 1;
                 continue;
             }
             let work = self.idle.remove(&handle);
@@ -259,6 +269,31 @@ impl DeformablePipeline {
         deformables.attachments_mut().for_each(DeformableAttachment::end_step);
         self.counters.active_contacts = self.contacts.iter().filter(|c| c.force != Vector::ZERO).count();
         self.idle.extend(self.works.drain(..).map(|work| (work.handle, work)));
+    }
+}
+
+impl DeformablePipeline {
+    /// Lets islands fall asleep that have been still.
+    fn fall_asleep(
+        &mut self,
+        deformables: &mut DeformableBodySet,
+        sets: RapierSets<'_>,
+        gravity: Vector,
+        h: f64,
+    ) {
+        self.sleeping.rigid.clear();
+        let gravity = from_real(gravity);
+        for island in &self.islands {
+            self.slept.clear();
+            self.slept.extend(island.handles.iter().copied());
+            for handle in &self.slept {
+                if let Some(body) = deformables.get_mut(*handle) {
+                    body.count_stillness(h);
+                }
+            }
+            let (scene, candidates) = (&self.scene, &self.candidates);
+            self.sleeping.fall_asleep(island, &self.slept, deformables, scene, candidates, sets, &gravity, h);
+        }
     }
 }
 

@@ -134,6 +134,7 @@ impl BodyWork {
 pub(super) struct IslandWork {
     pub island: Island,
     pub members: Vec<usize>,
+    pub handles: Vec<DeformableBodyHandle>,
 }
 
 impl IslandWork {
@@ -141,6 +142,7 @@ impl IslandWork {
     pub fn take_in(&mut self, index: usize, work: &mut BodyWork) {
         let local = self.members.len();
         self.members.push(index);
+        self.handles.push(work.handle);
         self.island.bodies.extend(work.problem.take());
         for mut row in work.rows.drain(..) {
             for side in &mut row.sides {

@@ -21,11 +21,12 @@ pub fn world_with_floor(dt: f32) -> (PhysicsWorld, ColliderHandle) {
     (physics, floor)
 }
 
-/// The cube of the tests: 0.4 m, 6 × 6 × 6 cells, 64 kg, its centre at `y` [m].
+/// The cube of the tests: 0.4 m, 6 × 6 × 6 cells, 64 kg, its centre at `y` [m]; always awake.
 pub fn cube(material: DeformableMaterial, y: f32) -> DeformableBodyBuilder {
     DeformableBodyBuilder::cuboid(Vector::splat(0.2), [6, 6, 6])
         .translation(Vector::Y * y)
         .material(material.friction(MU))
+        .can_sleep(false)
 }
 
 /// Vertices of a body whose rest position satisfies a condition.

@@ -1,0 +1,63 @@
+//! Bodies that lie still for a while are not stepped until something about them changes.
+
+use super::body::DeformableBody;
+use crate::math::{Pose64, Vec3};
+
+/// Speed [m/s] below which a vertex counts as still.
+pub(crate) const STILL_SPEED: f64 = 0.01;
+/// Time \[s\] after which a still body falls asleep, with all that it touches. Rapier's.
+pub(crate) const TIME_UNTIL_SLEEP: f64 = 0.5;
+
+/// How a body sleeps, or how far it is from that.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Sleep {
+    /// Time \[s\] for which the body has been still.
+    pub still_for: f64,
+    pub surroundings: Option<Surroundings>,
+}
+
+/// What was around a body when it fell asleep: whatever differs wakes it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Surroundings {
+    /// Key, part, and pose of the obstacles near it.
+    pub obstacles: Vec<(u64, u32, Pose64)>,
+    pub gravity: Vec3,
+    /// Length of the step \[s\].
+    pub dt: f64,
+}
+
+impl DeformableBody {
+    /// Whether the body sleeps: it lay still for half a second, as did all that it touches, and is not
+    /// stepped until something near it moves, comes or goes, or its user changes it.
+    pub fn is_sleeping(&self) -> bool {
+        self.state.sleep.surroundings.is_some()
+    }
+
+    /// Wakes the body, or keeps it awake for another half second.
+    pub fn wake_up(&mut self) {
+        self.state.sleep = Sleep::default();
+    }
+
+    /// Whether the body may fall asleep.
+    pub fn can_sleep(&self) -> bool {
+        self.can_sleep
+    }
+
+    /// Lets the body fall asleep, or keeps it from it.
+    pub fn set_can_sleep(&mut self, can_sleep: bool) {
+        self.can_sleep = can_sleep;
+        self.wake_up();
+    }
+
+    /// Counts the time for which the body has been still.
+    pub(crate) fn count_stillness(&mut self, dt: f64) {
+        let still = self.can_sleep && self.max_speed() < STILL_SPEED;
+        self.state.sleep.still_for = if still { self.state.sleep.still_for + dt } else { 0.0 };
+    }
+
+    /// Falls asleep where it is.
+    pub(crate) fn fall_asleep(&mut self, surroundings: Surroundings) {
+        self.state.v.fill(Vec3::zeros());
+        self.state.sleep.surroundings = Some(surroundings);
+    }
+}

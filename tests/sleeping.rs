@@ -1,0 +1,121 @@
+//! Bodies fall asleep with what they touch, cost nothing then, and wake at once.
+mod common;
+use common::*;
+use foible3d::prelude::*;
+use rapier3d::prelude::*;
+
+struct Scene {
+    physics: PhysicsWorld,
+    world: DeformableWorld,
+    floor: RigidBodyHandle,
+    soft: DeformableBodyHandle,
+    load: RigidBodyHandle,
+}
+
+/// A soft cube on a floor with a box on it, all asleep.
+fn asleep() -> Scene {
+    let mut physics = PhysicsWorld::new();
+    let floor = RigidBodyBuilder::kinematic_position_based().translation(Vector::Y * -0.5);
+    let (floor, _) = physics.insert(floor, ColliderBuilder::cuboid(5.0, 0.5, 5.0).friction(MU as f32));
+    let shape = ColliderBuilder::cuboid(0.1, 0.1, 0.1).density(500.0).friction(MU as f32);
+    let (load, _) = physics.insert(RigidBodyBuilder::dynamic().translation(Vector::Y * 0.5), shape);
+    let mut world = DeformableWorld::new();
+    let soft = cube(DeformableMaterial::new(1e6, 0.3).stiffness_damping(0.01), 0.2).can_sleep(true);
+    let soft = world.insert(soft).unwrap();
+    for _ in 0..240 {
+        world.step(&mut physics);
+    }
+    assert!(world.bodies[soft].is_sleeping() && physics.bodies[load].is_sleeping());
+    Scene { physics, world, floor, soft, load }
+}
+
+impl Scene {
+    fn step(&mut self) {
+        self.world.step(&mut self.physics);
+    }
+
+    fn is_awake(&self) -> bool {
+        !self.world.bodies[self.soft].is_sleeping()
+    }
+}
+
+#[test]
+fn a_sleeping_body_stays_where_it_is_and_is_not_stepped() {
+    let mut scene = asleep();
+    let before = scene.world.bodies[scene.soft].state().clone();
+    let load = *scene.physics.bodies[scene.load].position();
+    for _ in 0..600 {
+        scene.step();
+        let counters = scene.world.counters();
+        assert_eq!((counters.bodies, counters.sleeping, counters.elements, counters.solves), (0, 1, 0, 0));
+    }
+    assert_eq!(scene.world.bodies[scene.soft].state(), &before);
+    assert_eq!(*scene.physics.bodies[scene.load].position(), load);
+    assert!(scene.physics.bodies[scene.load].is_sleeping());
+}
+
+#[test]
+fn it_wakes_at_once_when_something_changes() {
+    // Its support is removed.
+    let mut scene = asleep();
+    scene.physics.remove_body(scene.floor);
+    scene.step();
+    assert!(scene.is_awake());
+    (0..60).for_each(|_| scene.step());
+    assert!(scene.world.bodies[scene.soft].center_of_mass()[1] < -1.0);
+    // Its support moves.
+    let mut scene = asleep();
+    scene.physics.bodies[scene.floor].set_next_kinematic_translation(Vector::Y * -0.499);
+    (0..2).for_each(|_| scene.step());
+    assert!(scene.is_awake());
+    // The box on it is pushed.
+    let mut scene = asleep();
+    scene.physics.bodies[scene.load].apply_impulse(Vector::X * 2.0, true);
+    (0..2).for_each(|_| scene.step());
+    assert!(scene.is_awake());
+    // Its user pushes it.
+    let mut scene = asleep();
+    scene.world.bodies[scene.soft].apply_impulse(&[0], Vector::Y).unwrap();
+    scene.step();
+    assert!(scene.is_awake());
+    // Something comes flying.
+    let mut scene = asleep();
+    let ball = RigidBodyBuilder::dynamic().translation(Vector::new(-0.5, 0.2, 0.0)).linvel(Vector::X * 3.0);
+    scene.physics.insert(ball, ColliderBuilder::ball(0.05));
+    let mut woken = None;
+    for step in 0..30 {
+        scene.step();
+        if woken.is_none() && scene.is_awake() {
+            woken = Some(step);
+        }
+    }
+    assert!(woken.is_some_and(|step| step < 10), "{woken:?}");
+    // Gravity changes.
+    let mut scene = asleep();
+    scene.physics.gravity = Vector::Y * -5.0;
+    scene.step();
+    assert!(scene.is_awake());
+}
+
+#[test]
+fn a_restored_sleeper_sleeps_on_with_the_same_bits() {
+    let mut scene = asleep();
+    let state = scene.world.bodies[scene.soft].state().clone();
+    scene.world.bodies[scene.soft].wake_up();
+    scene.step();
+    scene.world.bodies[scene.soft].restore(state.clone()).unwrap();
+    scene.world.pipeline = DeformablePipeline::new();
+    assert_eq!(scene.world.bodies[scene.soft].state(), &state);
+    assert!(!scene.is_awake());
+}
+
+#[test]
+fn a_moving_body_does_not_fall_asleep() {
+    let mut physics = PhysicsWorld::new();
+    let mut world = DeformableWorld::new();
+    physics.gravity = Vector::ZERO;
+    let body = cube(DeformableMaterial::new(1e6, 0.3), 0.0).can_sleep(true).linvel(Vector::X * 0.02);
+    let body = world.insert(body).unwrap();
+    (0..120).for_each(|_| world.step(&mut physics));
+    assert!(!world.bodies[body].is_sleeping());
+}
