@@ -137,6 +137,9 @@ impl DeformablePipeline {
                 continue;
             }
             if !body.state.is_finite() {
+                if let Some(work) = self.idle.get(&handle) {
+                    work.roll_back(body, h);
+                }
                 quarantine(body, &mut self.counters);
                 continue;
             }

@@ -51,6 +51,20 @@ impl BodyWork {
         }
     }
 
+    /// Puts a body whose state is no number back to where its last step left it.
+    pub fn roll_back(&self, body: &mut DeformableBody, h: f64) {
+        let Some(problem) = self.problem.as_ref().filter(|p| p.model.id == body.model.id) else { return };
+        if !problem.current.x.iter().all(is_number) {
+            return;
+        }
+        let DeformableState { x, v, contacts, closure, .. } = &mut body.state;
+        for (i, (new, old)) in problem.current.x.iter().zip(&problem.x_start).enumerate() {
+            (x[i], v[i]) = (*new, (new - old) / h);
+        }
+        contacts.clear();
+        closure.clear();
+    }
+
     /// Finds the body's contacts.
     pub fn detect(
         &mut self,

@@ -136,6 +136,14 @@ mod tests {
         world.bodies[bad].restore(sound).unwrap();
         world.bodies[bad].set_enabled(true);
         world.step(&mut physics);
+        // After a step there is a state to go back to.
+        let before = world.bodies[bad].state().x.clone();
+        world.bodies[bad].state.v[0].x = f64::INFINITY;
+        world.step(&mut physics);
+        assert!(world.bodies[bad].is_quarantined());
+        assert_eq!(world.bodies[bad].state().x, before);
+        world.bodies[bad].set_enabled(true);
+        world.step(&mut physics);
         assert!(!world.bodies[bad].is_quarantined() && world.counters().bodies == 2);
     }
 }
