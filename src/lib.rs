@@ -56,6 +56,7 @@ pub use material::{DeformableMaterial, MaterialError};
 pub use mesh::{MeshError, TetMesh};
 pub use pipeline::{
     DeformableContact, DeformableCounters, DeformableParameters, DeformablePipeline, DeformableWorld,
+    JointForce, JointRole, RigidContact, SolvedJoint,
 };
 
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
@@ -64,8 +65,8 @@ pub mod prelude {
         Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
         DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
         DeformableContact, DeformableCounters, DeformableMaterial, DeformableModel, DeformableParameters,
-        DeformablePipeline, DeformableWorld, Elasticity, FactorPrecision, Frames, PhysicsParts,
-        SolverSettings, SystemMatrix, TetMesh,
+        DeformablePipeline, DeformableWorld, Elasticity, FactorPrecision, Frames, JointForce, JointRole,
+        PhysicsParts, RigidContact, SolvedJoint, SolverSettings, SystemMatrix, TetMesh,
     };
 }
 

@@ -46,6 +46,9 @@ fn two_boxes_stand_on_a_cube_whatever_their_masses() {
         let speed = settle(&mut physics, &mut world, &[lower, upper], 480);
         let gap = physics.bodies[upper].translation().y - physics.bodies[lower].translation().y - 0.2;
         let carried = f64::from(world.contact_force(body, floor).y) / (load + 64.0 * G);
+        // Between the two boxes: all of it, of which rapier's own contacts show next to nothing.
+        let between: f64 = world.rigid_contacts().iter().map(|c| f64::from(c.force.y.abs())).sum();
+        assert!((between / (10.0 * ratio * G) - 1.0).abs() < 1e-3, "1:{ratio}: {between} N between them");
         println!("1:{ratio}: speed {speed:.1e} m/s, gap {gap:.1e} m, force/weight {carried:.6}");
         assert!(speed < 1e-3, "1:{ratio}: {speed:e} m/s");
         assert!(f64::from(gap).abs() < 1e-4, "1:{ratio}: {gap:e} m");
@@ -100,7 +103,6 @@ fn a_tower_of_soft_and_rigid_boxes_stands_still() {
     }
 }
 
-/// A vertical pole on a revolute joint, horizontal axis z; a soft cube hangs nowhere near it.
 #[test]
 fn a_hinged_lid_presses_on_a_cube_with_its_moment() {
     // A lid of 1 m hinged at x = −0.5 rests on a soft cube at x = 0.2: the cube carries
@@ -156,6 +158,8 @@ fn a_motor_presses_with_its_greatest_force() {
     let force = -f64::from(world.contact_force(body, wall).x);
     println!("motor: {force} N on the wall, {speed:.1e} m/s");
     assert!((force / 200.0 - 1.0).abs() < 1e-3, "{force} N");
+    let motor = world.joint_force(SolvedJoint::Impulse(joint), 0);
+    assert!((motor / 200.0 - 1.0).abs() < 1e-3, "{motor} N");
     assert!(speed < 1e-3);
     // The user's motor is as it was.
     let motor = physics.impulse_joints.get(joint).unwrap();
@@ -236,6 +240,9 @@ fn an_arm_presses_a_pad_with_its_motors_torque() {
     let on_floor = f64::from(world.contact_force(pad, floor).y);
     println!("arm: {torque} N m of 30 on the pad, {on_floor} N on the floor, {speed:.1e} m/s");
     assert!((torque.abs() / 30.0 - 1.0).abs() < 1e-2, "{torque} N m");
+    // The joint's torque is the lever arm times the contact force.
+    let motor = world.joint_force(SolvedJoint::Multibody(bar), 3);
+    assert!((motor + torque).abs() < 1e-2 * torque.abs(), "{motor} N m against {torque} N m");
     assert!((on_floor / (torque.abs() / 0.8) - 1.0).abs() < 0.05, "{on_floor} N");
     assert!(speed < 1e-3, "{speed:e}");
 }

@@ -119,3 +119,28 @@ fn a_moving_body_does_not_fall_asleep() {
     (0..120).for_each(|_| world.step(&mut physics));
     assert!(!world.bodies[body].is_sleeping());
 }
+
+#[test]
+fn a_tower_of_soft_and_rigid_boxes_ends_asleep() {
+    let (mut physics, _) = world_with_floor(1.0 / 60.0);
+    let mut world = DeformableWorld::new();
+    let mut boxes = Vec::new();
+    for k in 0..10 {
+        let at = Vector::Y * (0.2 + 0.4 * k as f32);
+        if k % 2 == 0 {
+            let builder = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [3; 3]).translation(at);
+            world.insert(builder.material(DeformableMaterial::new(1e7, 0.3).friction(MU))).unwrap();
+        } else {
+            let shape = ColliderBuilder::cuboid(0.2, 0.2, 0.2).density(1000.0).friction(MU as f32);
+            boxes.push(physics.insert(RigidBodyBuilder::dynamic().translation(at), shape).0);
+        }
+    }
+    (0..300).for_each(|_| world.step(&mut physics));
+    assert!(world.bodies.iter().all(|(_, body)| body.is_sleeping()));
+    assert!(boxes.iter().all(|b| physics.bodies[*b].is_sleeping()));
+    assert_eq!(world.counters().sleeping, 5);
+    // Taking the second box from below wakes what stood on it.
+    physics.remove_body(boxes[0]);
+    (0..30).for_each(|_| world.step(&mut physics));
+    assert!(world.bodies.iter().skip(1).all(|(_, body)| !body.is_sleeping()));
+}

@@ -26,9 +26,19 @@ pub(crate) struct Closure {
     /// Multibody links whose joints' motors this step drives.
     pub driven_links: Vec<(MultibodyIndex, usize)>,
     articulations: HashSet<usize>,
+    /// Pairs of colliders by what the keys of their rows hold, ascending.
+    pairs: Vec<((u64, u32), (ColliderHandle, ColliderHandle))>,
     queue: Vec<RigidBodyHandle>,
     reached: HashSet<RigidBodyHandle>,
     done: HashSet<RigidBodyHandle>,
+}
+
+/// What a row between rigid bodies belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum ClosureSource {
+    Contact(ColliderHandle, ColliderHandle),
+    Joint(ImpulseJointHandle),
+    Link(RigidBodyHandle),
 }
 
 /// Where in [`ContactKey::slot`] rows of rapier's contacts are told from those of its joints.
@@ -55,6 +65,7 @@ impl Closure {
         self.driven.clear();
         self.driven_links.clear();
         self.articulations.clear();
+        self.pairs.clear();
         self.queue.clear();
         self.reached.clear();
         self.done.clear();
@@ -75,6 +86,23 @@ impl Closure {
             self.done.insert(handle);
         }
         self.rows.sort_unstable_by_key(|row| row.key);
+        self.pairs.sort_unstable_by_key(|(key, _)| *key);
+    }
+
+    /// What a row of the last walk belongs to.
+    pub fn source(&self, key: &ContactKey) -> Option<ClosureSource> {
+        let (index, generation) = ((key.obstacle >> 32) as u32, key.obstacle as u32);
+        match key.slot {
+            CONTACT_SLOT => {
+                let wanted = (key.obstacle, key.part);
+                let place = self.pairs.binary_search_by_key(&wanted, |(key, _)| *key).ok()?;
+                let (first, second) = self.pairs[place].1;
+                Some(ClosureSource::Contact(first, second))
+            }
+            JOINT_SLOT => Some(ClosureSource::Joint(ImpulseJointHandle::from_raw_parts(index, generation))),
+            LINK_SLOT => Some(ClosureSource::Link(RigidBodyHandle::from_raw_parts(index, generation))),
+            _ => None,
+        }
     }
 
     fn reach(&mut self, scene: &RapierScene, partner: PartnerId, limit: usize) {
@@ -104,6 +132,9 @@ impl Closure {
                 let sides = [pair.collider1, pair.collider2]
                     .map(|c| scene.collider_partner(sets, c, gravity, dt).zip(collider_pose(sets, c)));
                 let [Some((first, pose1)), Some((second, pose2))] = sides else { continue };
+                let (index, generation) = pair.collider1.into_raw_parts();
+                let key = (u64::from(index) << 32 | u64::from(generation), pair.collider2.into_raw_parts().0);
+                self.pairs.push((key, (pair.collider1, pair.collider2)));
                 contact_rows(pair, [first, second], [&pose1, &pose2], sets, &mut self.rows);
                 self.reach(scene, first, limit);
                 self.reach(scene, second, limit);

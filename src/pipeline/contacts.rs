@@ -1,6 +1,7 @@
 //! Contacts as users read them.
 
 use crate::body::DeformableBodyHandle;
+use rapier3d::dynamics::{ImpulseJointHandle, RigidBodyHandle};
 use rapier3d::geometry::ColliderHandle;
 use rapier3d::math::Vector;
 
@@ -19,4 +20,55 @@ pub struct DeformableContact {
     pub force: Vector,
     /// Distance along the normal at the end of the step \[m\]; negative is penetration.
     pub gap: f64,
+}
+
+/// A contact between two rigid bodies that the last step solved, because one of them is touched by a
+/// deformable body, or holds one that is. What rapier's own contact then shows is its remainder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RigidContact {
+    /// The first collider, as rapier orders the pair.
+    pub collider1: ColliderHandle,
+    /// The second collider.
+    pub collider2: ColliderHandle,
+    /// Point on the second collider at the start of the step \[m\].
+    pub point: Vector,
+    /// Unit normal, from the first collider to the second.
+    pub normal: Vector,
+    /// Force on the second collider \[N\]; the first got the opposite.
+    pub force: Vector,
+}
+
+/// A joint that the last step solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SolvedJoint {
+    /// A joint of rapier's `ImpulseJointSet`.
+    Impulse(ImpulseJointHandle),
+    /// The joint of a multibody that leads to this link.
+    Multibody(RigidBodyHandle),
+}
+
+/// What a row of a joint is there for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum JointRole {
+    /// Holds a locked axis.
+    Lock,
+    /// Keeps to the lower limit.
+    LowerLimit,
+    /// Keeps to the upper limit.
+    UpperLimit,
+    /// Drives. The motor rests in rapier's own step, so this is all of its force.
+    Motor,
+}
+
+/// Force of one axis of a joint in the last step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointForce {
+    /// The joint.
+    pub joint: SolvedJoint,
+    /// 0 to 2 along the axes of the first body's frame, 3 to 5 about them, 6 the distance of coupled axes.
+    pub axis: usize,
+    /// What it is there for.
+    pub role: JointRole,
+    /// On the second body, along the axis \[N\] or about it \[N m\].
+    pub force: f64,
 }

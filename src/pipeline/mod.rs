@@ -10,7 +10,7 @@ mod threads;
 mod work;
 mod world;
 
-pub use contacts::DeformableContact;
+pub use contacts::{DeformableContact, JointForce, JointRole, RigidContact, SolvedJoint};
 pub use parameters::{DeformableCounters, DeformableParameters};
 pub use pipeline::DeformablePipeline;
 pub use world::DeformableWorld;

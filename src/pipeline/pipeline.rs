@@ -5,7 +5,7 @@
 //! → write reactions → (rapier steps) → after_step
 //! ```
 
-use super::contacts::DeformableContact;
+use super::contacts::{DeformableContact, JointForce, JointRole, RigidContact, SolvedJoint};
 use super::grouping::Grouping;
 use super::parameters::{DeformableCounters, DeformableParameters};
 use super::sleeping::Sleeping;
@@ -16,7 +16,9 @@ use crate::body::{
     DeformableBodySet, is_number,
 };
 use crate::contact::{Candidates, Row, Side};
-use crate::coupling::{Closure, PhysicsParts, RapierScene, RapierSets, Reactions, attachment_of, tie_rows};
+use crate::coupling::{
+    Closure, ClosureSource, PhysicsParts, RapierScene, RapierSets, Reactions, attachment_of, tie_rows,
+};
 use crate::error::DeformableBodyError;
 use crate::math::{Vec3, from_real, to_real};
 use crate::solver::{FactorCache, FactorKey, ROUNDING, Reaction};
@@ -45,6 +47,8 @@ pub struct DeformablePipeline {
     reaction_list: Vec<Reaction>,
     reactions: Reactions,
     contacts: Vec<DeformableContact>,
+    rigid_contacts: Vec<RigidContact>,
+    joint_forces: Vec<JointForce>,
     counters: DeformableCounters,
 }
 
@@ -65,6 +69,8 @@ impl DeformablePipeline {
     ) {
         self.counters = DeformableCounters::default();
         self.contacts.clear();
+        self.rigid_contacts.clear();
+        self.joint_forces.clear();
         // If the last step was not ended by `after_step`, the users' forces are still ours to return.
         self.reactions.take_back(parts);
         let (gravity, dt) = (parts.gravity, parts.dt);
@@ -118,6 +124,16 @@ impl DeformablePipeline {
     /// Contacts of the last step.
     pub fn contacts(&self) -> &[DeformableContact] {
         &self.contacts
+    }
+
+    /// Contacts between rigid bodies that the last step solved.
+    pub fn rigid_contacts(&self) -> &[RigidContact] {
+        &self.rigid_contacts
+    }
+
+    /// Forces of the joints that the last step solved, axis by axis.
+    pub fn joint_forces(&self) -> &[JointForce] {
+        &self.joint_forces
     }
 
     /// What the last step did.
@@ -264,6 +280,7 @@ impl DeformablePipeline {
                 let handle_of = |local: usize| self.works[work.members[local]].handle;
                 list_contacts(work, &self.scene, handle_of, &mut self.contacts);
                 add_attachment_forces(work, deformables);
+                list_closure(work, &self.closure, &mut self.rigid_contacts, &mut self.joint_forces);
             }
             for (problem, &index) in work.island.bodies.drain(..).zip(&work.members) {
                 self.works[index].problem = Some(problem);
@@ -344,6 +361,38 @@ fn add_attachment_forces(work: &IslandWork, deformables: &mut DeformableBodySet)
         if let Some(attachment) = attachment.and_then(|handle| deformables.attachment_mut(handle)) {
             attachment.force += system.force(i);
         }
+    }
+}
+
+fn list_closure(
+    work: &IslandWork,
+    closure: &Closure,
+    contacts: &mut Vec<RigidContact>,
+    joints: &mut Vec<JointForce>,
+) {
+    let system = &work.island.contacts;
+    for (i, row) in system.rows.iter().enumerate().filter(|(_, row)| row.key.is_link()) {
+        let force = system.force(i);
+        let joint = match closure.source(&row.key) {
+            None => continue,
+            Some(ClosureSource::Contact(collider1, collider2)) => {
+                let Side::Partner { point, .. } = &row.sides[0] else { continue };
+                let (point, normal, force) = (to_real(point), to_real(&row.frame[0]), to_real(&force));
+                contacts.push(RigidContact { collider1, collider2, point, normal, force });
+                continue;
+            }
+            Some(ClosureSource::Joint(handle)) => SolvedJoint::Impulse(handle),
+            Some(ClosureSource::Link(handle)) => SolvedJoint::Multibody(handle),
+        };
+        let along = force.dot(&row.frame[0]);
+        // Upper limits are rows along the reversed axis.
+        let (role, force) = match row.key.feature {
+            0 => (JointRole::Lock, along),
+            1 => (JointRole::LowerLimit, along),
+            2 => (JointRole::UpperLimit, -along),
+            _ => (JointRole::Motor, along),
+        };
+        joints.push(JointForce { joint, axis: row.key.part as usize, role, force });
     }
 }
 

@@ -1,6 +1,6 @@
 //! Deformable bodies beside a rapier `PhysicsWorld`.
 
-use super::contacts::DeformableContact;
+use super::contacts::{DeformableContact, RigidContact, SolvedJoint};
 use super::parameters::{DeformableCounters, DeformableParameters};
 use super::pipeline::DeformablePipeline;
 use crate::body::{DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet};
@@ -108,6 +108,19 @@ impl DeformableWorld {
     pub fn contact_force(&self, body: DeformableBodyHandle, collider: ColliderHandle) -> Vector {
         let pair = self.contacts_of(body).filter(|c| c.collider == collider);
         pair.map(|c| c.force).sum()
+    }
+
+    /// Contacts between rigid bodies that the last step solved: of those that deformables touch, or that
+    /// hold such. What rapier's own contacts show is their remainder.
+    pub fn rigid_contacts(&self) -> &[RigidContact] {
+        self.pipeline.rigid_contacts()
+    }
+
+    /// Force \[N\] or moment \[N m\] of one axis of a joint that the last step solved: locks, limits and
+    /// motors together, on its second body. Zero for joints that it did not solve.
+    pub fn joint_force(&self, joint: SolvedJoint, axis: usize) -> f64 {
+        let forces = self.pipeline.joint_forces().iter();
+        forces.filter(|f| f.joint == joint && f.axis == axis).map(|f| f.force).sum()
     }
 
     /// What the last step did, and how long it took.
