@@ -44,6 +44,11 @@ fn a_sleeping_body_stays_where_it_is_and_is_not_stepped() {
     let mut scene = asleep();
     let before = scene.world.bodies[scene.soft].state().clone();
     let load = *scene.physics.bodies[scene.load].position();
+    let floor = scene.physics.bodies[scene.floor].colliders()[0];
+    let carried = scene.world.contact_force(scene.soft, floor);
+    let weight =
+        (scene.world.bodies[scene.soft].mass() + f64::from(scene.physics.bodies[scene.load].mass())) * G;
+    assert!((f64::from(carried.y) / weight - 1.0).abs() < 1e-2, "{carried}");
     for _ in 0..600 {
         scene.step();
         let counters = scene.world.counters();
@@ -52,6 +57,8 @@ fn a_sleeping_body_stays_where_it_is_and_is_not_stepped() {
     assert_eq!(scene.world.bodies[scene.soft].state(), &before);
     assert_eq!(*scene.physics.bodies[scene.load].position(), load);
     assert!(scene.physics.bodies[scene.load].is_sleeping());
+    // What it carries can still be read.
+    assert_eq!(scene.world.contact_force(scene.soft, floor), carried);
 }
 
 #[test]

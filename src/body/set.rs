@@ -4,6 +4,7 @@ use super::attachment::{DeformableAttachment, DeformableAttachmentHandle};
 use super::body::DeformableBody;
 use super::builder::DeformableBodyBuilder;
 use crate::error::{DeformableBodyError, HandleError};
+use crate::math::Vec3;
 use rapier3d::data::arena::{Arena, Index};
 use std::collections::BTreeMap;
 use std::ops::{Index as At, IndexMut as AtMut};
@@ -90,6 +91,15 @@ impl DeformableBodySet {
     /// All attachments, oldest first.
     pub fn attachments(&self) -> impl Iterator<Item = (DeformableAttachmentHandle, &DeformableAttachment)> {
         self.attachments.iter().map(|(handle, attachment)| (*handle, attachment))
+    }
+
+    /// Forgets the forces of all attachments but those of sleeping bodies.
+    pub(crate) fn reset_attachment_forces(&mut self) {
+        for attachment in self.attachments.values_mut() {
+            if self.bodies.get(attachment.body.0).is_some_and(|body| !body.is_sleeping()) {
+                attachment.force = Vec3::zeros();
+            }
+        }
     }
 
     pub(crate) fn attachments_mut(&mut self) -> impl Iterator<Item = &mut DeformableAttachment> {

@@ -34,9 +34,9 @@ struct Replaced {
 }
 
 impl Reactions {
-    /// Puts the bodies in `asleep` to sleep.
-    /// Hands over the reactions of a step of `dt` \[s\] to the bodies of the scene. Velocities are changed
-    /// by the inverse masses that the solve used: rapier's own are zero before its first step.
+    /// Hands over the reactions of a step to the bodies of the scene, and puts those in `asleep` to sleep.
+    /// Velocities are changed by the inverse masses that the solve used: rapier's own are zero before its
+    /// first step.
     pub fn write(
         &mut self,
         parts: &mut PhysicsParts<'_>,

@@ -68,13 +68,13 @@ impl DeformablePipeline {
         parts: &mut PhysicsParts<'_>,
     ) {
         self.counters = DeformableCounters::default();
-        self.contacts.clear();
         self.rigid_contacts.clear();
         self.joint_forces.clear();
         // If the last step was not ended by `after_step`, the users' forces are still ours to return.
         self.reactions.take_back(parts);
         let (gravity, dt) = (parts.gravity, parts.dt);
         if !(dt.is_finite() && dt > 0.0 && gravity.is_finite()) {
+            self.contacts.clear();
             self.counters.skipped = true;
             return;
         }
@@ -84,6 +84,8 @@ impl DeformablePipeline {
         self.read_obstacles(sets, gravity, h);
         self.sleeping.wake_attached(deformables, sets);
         self.predict(deformables, gravity, h);
+        // What touches a sleeping body goes on to do so.
+        self.contacts.retain(|c| deformables.get(c.body).is_some_and(DeformableBody::is_sleeping));
         self.detect(deformables, sets);
         self.tie(deformables, sets, gravity, h);
         self.close(sets, gravity, h, parameters.closure_bodies);
@@ -121,7 +123,7 @@ impl DeformablePipeline {
         Ok(())
     }
 
-    /// Contacts of the last step.
+    /// Contacts of the last step; of sleeping bodies those with which they fell asleep.
     pub fn contacts(&self) -> &[DeformableContact] {
         &self.contacts
     }
@@ -218,7 +220,6 @@ impl DeformablePipeline {
     fn tie(&mut self, deformables: &DeformableBodySet, sets: RapierSets<'_>, gravity: Vector, h: f64) {
         self.ties.clear();
         self.works.iter_mut().for_each(|work| work.tied.clear());
-        // Works are in the order of the set.
         let works = &self.works;
         let index_of = |handle: DeformableBodyHandle| works.iter().position(|w| w.handle == handle);
         tie_rows(deformables, &mut self.scene, sets, gravity, h, index_of, &mut self.ties);
@@ -260,7 +261,7 @@ impl DeformablePipeline {
     }
 
     fn advance(&mut self, deformables: &mut DeformableBodySet, h: f64) {
-        deformables.attachments_mut().for_each(|a| a.force = Vec3::zeros());
+        deformables.reset_attachment_forces();
         self.reaction_list.clear();
         self.reaction_list.resize(self.scene.partners.list.len(), Reaction::default());
         for work in &mut self.islands {

@@ -89,7 +89,7 @@ impl DeformableWorld {
         self.pipeline.after_step(&mut PhysicsParts::from(physics));
     }
 
-    /// Contacts of the last step.
+    /// Contacts of the last step; of sleeping bodies those with which they fell asleep.
     pub fn contacts(&self) -> &[DeformableContact] {
         self.pipeline.contacts()
     }

@@ -29,8 +29,7 @@ impl ContactGroups {
     pub fn arrange(&mut self, rows: &mut [Row], partners: &Partners) {
         self.find(rows, partners);
         self.eliminate();
-        let (group_of_row, rank) = (&mut self.group_of_row, &self.rank);
-        // Insertion by cycles would be less memory; rows are few and mostly in order.
+        let (group_of_row, rank) = (&self.group_of_row, &self.rank);
         let sorted = group_of_row.windows(2).all(|w| rank[w[0]] <= rank[w[1]]);
         if !sorted {
             let ends = &self.ends;
