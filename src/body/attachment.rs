@@ -51,7 +51,16 @@ pub(crate) enum Anchors {
 impl DeformableAttachment {
     /// Whether it is of this body, or to it.
     pub(super) fn ties(&self, body: DeformableBodyHandle) -> bool {
-        self.body == body || matches!(self.anchors, Anchors::Deformable(other, _) if other == body)
+        self.bodies().contains(&Some(body))
+    }
+
+    /// The deformable bodies that it ties.
+    pub(crate) fn bodies(&self) -> [Option<DeformableBodyHandle>; 2] {
+        let other = match self.anchors {
+            Anchors::Deformable(other, _) => Some(other),
+            Anchors::World(_) | Anchors::Rigid(..) => None,
+        };
+        [Some(self.body), other]
     }
 
     /// The body whose vertices are tied.
@@ -109,14 +118,7 @@ impl DeformableAttachment {
 
     /// The bodies that it ties, if something was changed since this was asked last.
     pub(crate) fn take_changed(&mut self) -> [Option<DeformableBodyHandle>; 2] {
-        if !std::mem::take(&mut self.changed) {
-            return [None; 2];
-        }
-        let other = match self.anchors {
-            Anchors::Deformable(other, _) => Some(other),
-            Anchors::World(_) | Anchors::Rigid(..) => None,
-        };
-        [Some(self.body), other]
+        if std::mem::take(&mut self.changed) { self.bodies() } else { [None; 2] }
     }
 
     /// The rigid body that it ties to.

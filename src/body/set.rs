@@ -69,8 +69,10 @@ impl DeformableBodySet {
     /// Removes an attachment; `None` if it was removed before.
     pub fn detach(&mut self, handle: DeformableAttachmentHandle) -> Option<DeformableAttachment> {
         let attachment = self.attachments.remove(&handle)?;
-        if let Some(body) = self.get_mut(attachment.body) {
-            body.wake_up();
+        for handle in attachment.bodies().into_iter().flatten() {
+            if let Some(body) = self.get_mut(handle) {
+                body.wake_up();
+            }
         }
         Some(attachment)
     }

@@ -81,7 +81,7 @@ impl RapierScene {
     pub fn is_still(&self, sets: RapierSets<'_>, handle: RigidBodyHandle) -> bool {
         sets.bodies.get(handle).is_some_and(|body| {
             let threshold = body.activation().normalized_linear_threshold;
-            // A tenth of it, as that is what soft bodies are held to.
+            // A fifth of it: what soft bodies are held to, of rapier's 0.05 m/s.
             threshold > 0.0 && body.linvel().length().max(body.angvel().length()) < 0.2 * threshold
         })
     }

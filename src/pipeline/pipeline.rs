@@ -1,7 +1,7 @@
 //! The step.
 //!
 //! ```text
-//! read_obstacles → predict → detect → tie → close → prepare_factors → form_islands → solve → advance
+//! read_obstacles → wake → predict → detect → tie → close → prepare_factors → form_islands → solve → advance
 //! → write reactions → (rapier steps) → after_step
 //! ```
 
@@ -82,7 +82,7 @@ impl DeformablePipeline {
         let sets = parts.sets();
         let mut clock = Clock::start();
         self.read_obstacles(sets, gravity, h);
-        self.sleeping.wake_attached(deformables, sets);
+        self.wake(deformables, sets, gravity, h);
         self.predict(deformables, gravity, h);
         // What touches a sleeping body goes on to do so.
         self.contacts.retain(|c| deformables.get(c.body).is_some_and(DeformableBody::is_sleeping));
@@ -149,6 +149,11 @@ impl DeformablePipeline {
         self.counters.obstacles = self.scene.obstacles.len();
     }
 
+    fn wake(&mut self, deformables: &mut DeformableBodySet, sets: RapierSets<'_>, gravity: Vector, h: f64) {
+        let (scene, candidates) = (&self.scene, &self.candidates);
+        self.sleeping.wake(deformables, sets, scene, candidates, &from_real(gravity), h);
+    }
+
     fn predict(&mut self, deformables: &mut DeformableBodySet, gravity: Vector, h: f64) {
         for (handle, body) in deformables.iter_mut() {
             if !body.is_enabled() {
@@ -161,7 +166,7 @@ impl DeformablePipeline {
                 quarantine(body, &mut self.counters);
                 continue;
             }
-            if self.sleeping.sleeps_on(body, &self.scene, &self.candidates, &from_real(gravity), h) {
+            if body.is_sleeping() {
                 self.counters.sleeping += 1;
                 continue;
             }

@@ -19,7 +19,7 @@ pub(super) struct Sleeping {
 
 impl Sleeping {
     /// Wakes bodies whose attachments were changed, or are to a rigid body that is awake.
-    pub fn wake_attached(&mut self, deformables: &mut DeformableBodySet, sets: RapierSets<'_>) {
+    fn wake_attached(&mut self, deformables: &mut DeformableBodySet, sets: RapierSets<'_>) {
         self.wake.clear();
         for attachment in deformables.attachments_mut() {
             self.wake.extend(attachment.take_changed().into_iter().flatten());
@@ -28,6 +28,28 @@ impl Sleeping {
                 self.wake.push(attachment.body());
             }
         }
+        self.wake_listed(deformables);
+    }
+
+    /// Wakes bodies that are tied to one that is awake.
+    fn wake_tied(&mut self, deformables: &mut DeformableBodySet) {
+        loop {
+            self.wake.clear();
+            for (_, attachment) in deformables.attachments().filter(|(_, a)| !a.is_broken()) {
+                let [Some(one), Some(other)] = attachment.bodies() else { continue };
+                let (Some(a), Some(b)) = (deformables.get(one), deformables.get(other)) else { continue };
+                if a.is_enabled() && b.is_enabled() && a.is_sleeping() != b.is_sleeping() {
+                    self.wake.push(if a.is_sleeping() { one } else { other });
+                }
+            }
+            if self.wake.is_empty() {
+                return;
+            }
+            self.wake_listed(deformables);
+        }
+    }
+
+    fn wake_listed(&mut self, deformables: &mut DeformableBodySet) {
         for handle in &self.wake {
             if let Some(body) = deformables.get_mut(*handle).filter(|body| body.is_sleeping()) {
                 body.wake_up();
@@ -35,25 +57,25 @@ impl Sleeping {
         }
     }
 
-    /// Wakes a body if anything around it is not as it was when it fell asleep; tells whether it sleeps
-    /// on.
-    pub fn sleeps_on(
+    /// Wakes whoever has a reason to: a changed attachment, anything around it that is not as it was when
+    /// it fell asleep, a tie to a body that is awake.
+    pub fn wake(
         &mut self,
-        body: &mut DeformableBody,
+        deformables: &mut DeformableBodySet,
+        sets: RapierSets<'_>,
         scene: &RapierScene,
         candidates: &Candidates,
         gravity: &Vec3,
         dt: f64,
-    ) -> bool {
-        if !body.is_sleeping() {
-            return false;
+    ) {
+        self.wake_attached(deformables, sets);
+        for (_, body) in deformables.iter_mut().filter(|(_, body)| body.is_enabled() && body.is_sleeping()) {
+            self.look_around(body, scene, candidates, gravity, dt);
+            if body.state.sleep.surroundings.as_ref() != Some(&self.now) {
+                body.wake_up();
+            }
         }
-        self.look_around(body, scene, candidates, gravity, dt);
-        if body.state.sleep.surroundings.as_ref() == Some(&self.now) {
-            return true;
-        }
-        body.wake_up();
-        false
+        self.wake_tied(deformables);
     }
 
     fn look_around(
