@@ -7,7 +7,7 @@
 
 use super::joint_rows::{JointEnds, drive_rows, joint_rows};
 use super::obstacles::RapierScene;
-use super::parts::RapierSets;
+use super::parts::{RapierSets, packed, unpacked};
 use crate::body::{ContactKey, FIRST_LINK_SLOT};
 use crate::contact::{Law, PartnerId, Row, Side};
 use crate::math::{Pose64, from_real};
@@ -33,6 +33,16 @@ pub(crate) struct Closure {
     done: HashSet<RigidBodyHandle>,
 }
 
+/// Where a walk takes place, and how many bodies it goes through at the most.
+pub(crate) struct Around<'a> {
+    pub scene: &'a mut RapierScene,
+    pub sets: RapierSets<'a>,
+    pub gravity: Vector,
+    /// \[s\].
+    pub dt: f64,
+    pub limit: usize,
+}
+
 /// What a row between rigid bodies belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum ClosureSource {
@@ -51,16 +61,8 @@ const LINK_SLOT: u32 = FIRST_LINK_SLOT + 2;
 const POINTS: u32 = 1 << 16;
 
 impl Closure {
-    /// Walks from the `touched` partners; at most `limit` bodies are walked through.
-    pub fn walk(
-        &mut self,
-        scene: &mut RapierScene,
-        sets: RapierSets<'_>,
-        touched: impl Iterator<Item = PartnerId>,
-        gravity: Vector,
-        dt: f64,
-        limit: usize,
-    ) {
+    /// Walks from the `touched` partners.
+    pub fn walk(&mut self, around: &mut Around<'_>, touched: impl Iterator<Item = PartnerId>) {
         self.rows.clear();
         self.driven.clear();
         self.driven_links.clear();
@@ -69,20 +71,20 @@ impl Closure {
         self.queue.clear();
         self.reached.clear();
         self.done.clear();
-        if limit == 0 {
+        if around.limit == 0 {
             return;
         }
         for partner in touched {
-            self.reach(scene, partner, limit);
+            self.reach(around, partner);
         }
         // Whichever soft body came first: the walk must not depend on it.
         self.queue.sort_unstable_by_key(|h| h.into_raw_parts());
         let mut next = 0;
         while let Some(&handle) = self.queue.get(next) {
             next += 1;
-            self.take_contacts(handle, scene, sets, gravity, dt, limit);
-            self.take_joints(handle, scene, sets, gravity, dt, limit);
-            self.take_articulation(handle, scene, sets, gravity, dt, limit);
+            self.take_contacts(handle, around);
+            self.take_joints(handle, around);
+            self.take_articulation(handle, around);
             self.done.insert(handle);
         }
         self.rows.sort_unstable_by_key(|row| row.key);
@@ -91,7 +93,7 @@ impl Closure {
 
     /// What a row of the last walk belongs to.
     pub fn source(&self, key: &ContactKey) -> Option<ClosureSource> {
-        let (index, generation) = ((key.obstacle >> 32) as u32, key.obstacle as u32);
+        let (index, generation) = unpacked(key.obstacle);
         match key.slot {
             CONTACT_SLOT => {
                 let wanted = (key.obstacle, key.part);
@@ -105,22 +107,16 @@ impl Closure {
         }
     }
 
-    fn reach(&mut self, scene: &RapierScene, partner: PartnerId, limit: usize) {
+    fn reach(&mut self, around: &Around<'_>, partner: PartnerId) {
+        let Around { scene, limit, .. } = around;
         let Some(handle) = scene.handles[partner.0 as usize] else { return };
-        if scene.partners.yields(partner) && self.queue.len() < limit && self.reached.insert(handle) {
+        if scene.partners.yields(partner) && self.queue.len() < *limit && self.reached.insert(handle) {
             self.queue.push(handle);
         }
     }
 
-    fn take_contacts(
-        &mut self,
-        handle: RigidBodyHandle,
-        scene: &mut RapierScene,
-        sets: RapierSets<'_>,
-        gravity: Vector,
-        dt: f64,
-        limit: usize,
-    ) {
+    fn take_contacts(&mut self, handle: RigidBodyHandle, around: &mut Around<'_>) {
+        let sets = around.sets;
         let Some(body) = sets.bodies.get(handle) else { return };
         for &collider in body.colliders() {
             for pair in sets.narrow_phase.contact_pairs_with(collider) {
@@ -130,94 +126,79 @@ impl Closure {
                     continue;
                 }
                 let sides = [pair.collider1, pair.collider2]
-                    .map(|c| scene.collider_partner(sets, c, gravity, dt).zip(collider_pose(sets, c)));
+                    .map(|c| around.collider_partner(c).zip(collider_pose(sets, c)));
                 let [Some((first, pose1)), Some((second, pose2))] = sides else { continue };
-                let (index, generation) = pair.collider1.into_raw_parts();
-                let key = (u64::from(index) << 32 | u64::from(generation), pair.collider2.into_raw_parts().0);
+                let key = (packed(pair.collider1.into_raw_parts()), pair.collider2.into_raw_parts().0);
                 self.pairs.push((key, (pair.collider1, pair.collider2)));
                 contact_rows(pair, [first, second], [&pose1, &pose2], sets, &mut self.rows);
-                self.reach(scene, first, limit);
-                self.reach(scene, second, limit);
+                self.reach(around, first);
+                self.reach(around, second);
             }
         }
     }
 
-    fn take_joints(
-        &mut self,
-        handle: RigidBodyHandle,
-        scene: &mut RapierScene,
-        sets: RapierSets<'_>,
-        gravity: Vector,
-        dt: f64,
-        limit: usize,
-    ) {
-        for (body1, body2, joint_handle, joint) in sets.impulse_joints.attached_enabled_joints(handle) {
+    fn take_joints(&mut self, handle: RigidBodyHandle, around: &mut Around<'_>) {
+        for (body1, body2, joint_handle, joint) in around.sets.impulse_joints.attached_enabled_joints(handle)
+        {
             let other = if body1 == handle { body2 } else { body1 };
             if other == handle || self.done.contains(&other) {
                 continue;
             }
-            let ends = [body1, body2].map(|b| scene.body_partner(sets, b, gravity, dt));
-            let poses = [body1, body2].map(|b| sets.bodies.get(b).map(|b| Pose64::from_real(b.position())));
-            let ([Some(first), Some(second)], [Some(pose1), Some(pose2)]) = (ends, poses) else { continue };
-            let (index, generation) = joint_handle.into_raw_parts();
-            let key = ContactKey {
-                obstacle: u64::from(index) << 32 | u64::from(generation),
-                part: 0,
-                feature: 0,
-                slot: JOINT_SLOT,
-            };
-            let ends = JointEnds { partners: [first, second], poses: [pose1, pose2] };
-            joint_rows(&joint.data, &ends, &scene.partners, dt, key, &mut self.rows);
+            let Some(ends) = around.ends([body1, body2]) else { continue };
+            let key = joint_key(joint_handle.into_raw_parts(), JOINT_SLOT);
+            joint_rows(&joint.data, &ends, &around.scene.partners, around.dt, key, &mut self.rows);
             if !joint.data.motor_axes.is_empty() {
                 self.driven.push(joint_handle);
             }
-            self.reach(scene, first, limit);
-            self.reach(scene, second, limit);
+            ends.partners.into_iter().for_each(|partner| self.reach(around, partner));
         }
     }
-}
 
-impl Closure {
     /// Limits and motors of the whole multibody that a link belongs to.
-    fn take_articulation(
-        &mut self,
-        handle: RigidBodyHandle,
-        scene: &mut RapierScene,
-        sets: RapierSets<'_>,
-        gravity: Vector,
-        dt: f64,
-        limit: usize,
-    ) {
-        let partner = scene.body_partner(sets, handle, gravity, dt).map(|id| *scene.partners.get(id));
+    fn take_articulation(&mut self, handle: RigidBodyHandle, around: &mut Around<'_>) {
+        let partner = around.body_partner(handle).map(|id| *around.scene.partners.get(id));
         let Some(Partner::Link { articulation, .. }) = partner else { return };
         if !self.articulations.insert(articulation) {
             return;
         }
-        for id in scene.partners.articulations[articulation].links.clone() {
-            self.reach(scene, id, limit);
+        for id in around.scene.partners.articulations[articulation].links.clone() {
+            self.reach(around, id);
         }
-        let index = scene.articulated[articulation].multibody;
-        let Some(multibody) = sets.multibody_joints.get_multibody(index) else { return };
+        let index = around.scene.articulated[articulation].multibody;
+        let Some(multibody) = around.sets.multibody_joints.get_multibody(index) else { return };
         for link in multibody.links() {
             let Some(parent) = link.parent_id().and_then(|id| multibody.link(id)) else { continue };
             let handles = [parent.rigid_body_handle(), link.rigid_body_handle()];
-            let ends = handles.map(|b| scene.body_partner(sets, b, gravity, dt));
-            let poses = handles.map(|b| sets.bodies.get(b).map(|b| Pose64::from_real(b.position())));
-            let ([Some(first), Some(second)], [Some(pose1), Some(pose2)]) = (ends, poses) else { continue };
-            let (body, generation) = handles[1].into_raw_parts();
-            let key = ContactKey {
-                obstacle: u64::from(body) << 32 | u64::from(generation),
-                part: 0,
-                feature: 0,
-                slot: LINK_SLOT,
-            };
-            let ends = JointEnds { partners: [first, second], poses: [pose1, pose2] };
-            drive_rows(&link.joint.data, &ends, &scene.partners, dt, key, &mut self.rows);
+            let Some(ends) = around.ends(handles) else { continue };
+            let key = joint_key(handles[1].into_raw_parts(), LINK_SLOT);
+            drive_rows(&link.joint.data, &ends, &around.scene.partners, around.dt, key, &mut self.rows);
             if !link.joint.data.motor_axes.is_empty() {
                 self.driven_links.push((index, link.link_id()));
             }
         }
     }
+}
+
+impl Around<'_> {
+    fn body_partner(&mut self, body: RigidBodyHandle) -> Option<PartnerId> {
+        self.scene.body_partner(self.sets, body, self.gravity, self.dt)
+    }
+
+    fn collider_partner(&mut self, collider: ColliderHandle) -> Option<PartnerId> {
+        self.scene.collider_partner(self.sets, collider, self.gravity, self.dt)
+    }
+
+    /// Two bodies as a joint sees them.
+    fn ends(&mut self, bodies: [RigidBodyHandle; 2]) -> Option<JointEnds> {
+        let [first, second] = bodies.map(|b| self.body_partner(b));
+        let [pose1, pose2] = bodies.map(|b| Some(Pose64::from_real(self.sets.bodies.get(b)?.position())));
+        Some(JointEnds { partners: [first?, second?], poses: [pose1?, pose2?] })
+    }
+}
+
+/// The key that the rows of a joint begin with.
+fn joint_key(joint: (u32, u32), slot: u32) -> ContactKey {
+    ContactKey { obstacle: packed(joint), part: 0, feature: 0, slot }
 }
 
 fn collider_pose(sets: RapierSets<'_>, handle: ColliderHandle) -> Option<Pose64> {
@@ -244,7 +225,6 @@ fn contact_rows(
     }
     let skin = |c: ColliderHandle| sets.colliders.get(c).map_or(0.0, |c| f64::from(c.contact_skin()));
     let skins = skin(pair.collider1) + skin(pair.collider2);
-    let (index, generation) = pair.collider1.into_raw_parts();
     for (m, manifold) in (0u32..).zip(pair.manifolds()) {
         if !manifold.data.solver_flags.contains(SolverFlags::COMPUTE_RIGID_IMPULSES) {
             continue;
@@ -256,7 +236,7 @@ fn contact_rows(
             let p1 = pose1.transform(&from_real(point.local_p1));
             let p2 = pose2.transform(&from_real(point.local_p2));
             let key = ContactKey {
-                obstacle: u64::from(index) << 32 | u64::from(generation),
+                obstacle: packed(pair.collider1.into_raw_parts()),
                 part: pair.collider2.into_raw_parts().0,
                 feature: (m % POINTS) * POINTS + k % POINTS,
                 slot: CONTACT_SLOT,

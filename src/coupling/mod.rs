@@ -11,7 +11,7 @@ mod parts;
 mod reactions;
 mod ties;
 
-pub(crate) use closure::{Closure, ClosureSource};
+pub(crate) use closure::{Around, Closure, ClosureSource};
 pub(crate) use obstacles::{RapierScene, combined};
 pub use parts::PhysicsParts;
 pub(crate) use parts::RapierSets;

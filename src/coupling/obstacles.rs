@@ -1,7 +1,7 @@
 //! Colliders and rigid bodies as obstacles and partners.
 
 use super::articulations::{ArticulatedLinks, read_articulation};
-use super::parts::RapierSets;
+use super::parts::{RapierSets, packed, unpacked};
 use crate::body::DeformableBody;
 use crate::contact::{Obstacle, PartnerId};
 use crate::math::{Mat3, Pose64, Vec3, from_real, rotation_from_vector};
@@ -74,7 +74,8 @@ impl RapierScene {
 
     /// The collider that an obstacle's key names.
     pub fn collider_of(&self, key: u64) -> ColliderHandle {
-        ColliderHandle::from_raw_parts((key >> 32) as u32, key as u32)
+        let (index, generation) = unpacked(key);
+        ColliderHandle::from_raw_parts(index, generation)
     }
 
     /// Whether a rigid body is slow enough to fall asleep, by its own thresholds.
@@ -161,12 +162,11 @@ impl RapierScene {
         start: Pose64,
         end: Pose64,
     ) {
-        let (index, generation) = handle.into_raw_parts();
         let mut push = |shape: SharedShape, part: u32, start: Pose64, end: Pose64| {
             self.colliders.push(handle);
             self.obstacles.push(Obstacle {
                 partner,
-                key: u64::from(index) << 32 | u64::from(generation),
+                key: packed(handle.into_raw_parts()),
                 part,
                 shape,
                 start,

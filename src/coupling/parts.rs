@@ -59,3 +59,13 @@ pub(crate) struct RapierSets<'a> {
     pub impulse_joints: &'a ImpulseJointSet,
     pub multibody_joints: &'a MultibodyJointSet,
 }
+
+/// A handle's slot and generation as one number.
+pub(super) fn packed((index, generation): (u32, u32)) -> u64 {
+    u64::from(index) << 32 | u64::from(generation)
+}
+
+/// Slot and generation of a packed handle.
+pub(super) fn unpacked(key: u64) -> (u32, u32) {
+    ((key >> 32) as u32, key as u32)
+}

@@ -5,6 +5,7 @@ mod grouping;
 mod parameters;
 #[allow(clippy::module_inception)]
 mod pipeline;
+mod readout;
 mod sleeping;
 mod threads;
 mod work;

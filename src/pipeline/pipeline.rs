@@ -5,22 +5,18 @@
 //! → write reactions → (rapier steps) → after_step
 //! ```
 
-use super::contacts::{DeformableContact, JointForce, JointRole, RigidContact, SolvedJoint};
+use super::contacts::{DeformableContact, JointForce, RigidContact};
 use super::grouping::Grouping;
 use super::parameters::{DeformableCounters, DeformableParameters};
+use super::readout::{add_attachment_forces, list_closure, list_contacts};
 use super::sleeping::Sleeping;
 use super::threads::for_each;
 use super::work::{BodyWork, IslandWork};
-use crate::body::{
-    DeformableAttachment, DeformableAttachmentHandle, DeformableBody, DeformableBodyHandle,
-    DeformableBodySet, is_number,
-};
+use crate::body::{DeformableAttachment, DeformableBody, DeformableBodyHandle, DeformableBodySet, is_number};
 use crate::contact::{Candidates, Row, Side};
-use crate::coupling::{
-    Closure, ClosureSource, PhysicsParts, RapierScene, RapierSets, Reactions, attachment_of, tie_rows,
-};
+use crate::coupling::{Around, Closure, PhysicsParts, RapierScene, RapierSets, Reactions, tie_rows};
 use crate::error::DeformableBodyError;
-use crate::math::{Vec3, from_real, to_real};
+use crate::math::from_real;
 use crate::solver::{FactorCache, FactorKey, ROUNDING, Reaction};
 use rapier3d::math::Vector;
 use std::collections::HashMap;
@@ -240,7 +236,8 @@ impl DeformablePipeline {
         let rows = self.works.iter().flat_map(|work| &work.rows).chain(&self.ties);
         let sides = rows.flat_map(|row| &row.sides);
         let touched = sides.filter_map(|side| side.partner());
-        self.closure.walk(&mut self.scene, sets, touched, gravity, h, limit);
+        let mut around = Around { scene: &mut self.scene, sets, gravity, dt: h, limit };
+        self.closure.walk(&mut around, touched);
         self.counters.closure_rows = self.closure.rows.len();
     }
 
@@ -358,74 +355,6 @@ fn store(
     body.report.guard_retries = problem.guard_retries;
     counters.guard_retries += problem.guard_retries;
     counters.not_converged += usize::from(!body.last_converged());
-}
-
-fn add_attachment_forces(work: &IslandWork, deformables: &mut DeformableBodySet) {
-    let system = &work.island.contacts;
-    for (i, row) in system.rows.iter().enumerate() {
-        let attachment = attachment_of(&row.key).map(DeformableAttachmentHandle);
-        if let Some(attachment) = attachment.and_then(|handle| deformables.attachment_mut(handle)) {
-            attachment.force += system.force(i);
-        }
-    }
-}
-
-fn list_closure(
-    work: &IslandWork,
-    closure: &Closure,
-    contacts: &mut Vec<RigidContact>,
-    joints: &mut Vec<JointForce>,
-) {
-    let system = &work.island.contacts;
-    for (i, row) in system.rows.iter().enumerate().filter(|(_, row)| row.key.is_link()) {
-        let force = system.force(i);
-        let joint = match closure.source(&row.key) {
-            None => continue,
-            Some(ClosureSource::Contact(collider1, collider2)) => {
-                let Side::Partner { point, .. } = &row.sides[0] else { continue };
-                let (point, normal, force) = (to_real(point), to_real(&row.frame[0]), to_real(&force));
-                contacts.push(RigidContact { collider1, collider2, point, normal, force });
-                continue;
-            }
-            Some(ClosureSource::Joint(handle)) => SolvedJoint::Impulse(handle),
-            Some(ClosureSource::Link(handle)) => SolvedJoint::Multibody(handle),
-        };
-        let along = force.dot(&row.frame[0]);
-        // Upper limits are rows along the reversed axis.
-        let (role, force) = match row.key.feature {
-            0 => (JointRole::Lock, along),
-            1 => (JointRole::LowerLimit, along),
-            2 => (JointRole::UpperLimit, -along),
-            _ => (JointRole::Motor, along),
-        };
-        joints.push(JointForce { joint, axis: row.key.part as usize, role, force });
-    }
-}
-
-fn list_contacts(
-    work: &IslandWork,
-    scene: &RapierScene,
-    handle_of: impl Fn(usize) -> DeformableBodyHandle,
-    contacts: &mut Vec<DeformableContact>,
-) {
-    let system = &work.island.contacts;
-    for (i, row) in system.rows.iter().enumerate() {
-        let [Side::Soft { body, .. }, Side::Partner { point, .. }] = &row.sides else {
-            continue;
-        };
-        if row.key.is_link() {
-            continue;
-        }
-        let normal: &Vec3 = &row.frame[0];
-        contacts.push(DeformableContact {
-            body: handle_of(*body),
-            collider: scene.collider_of(row.key.obstacle),
-            point: to_real(point),
-            normal: to_real(normal),
-            force: to_real(&system.force(i)),
-            gap: system.final_gap(i),
-        });
-    }
 }
 
 struct Clock(Instant);
