@@ -156,14 +156,14 @@ fn a_tower_of_soft_and_rigid_boxes_ends_asleep() {
 fn bodies_tied_to_one_another_wake_together() {
     // Two slabs tied end to end, the first over a support that the second does not touch.
     let mut physics = PhysicsWorld::new();
-    let support = RigidBodyBuilder::fixed().translation(Vector::new(0.0, -0.55, 0.0));
-    let support = physics.insert(support, ColliderBuilder::cuboid(0.1, 0.5, 0.1)).0;
+    let support = RigidBodyBuilder::fixed().translation(Vector::new(-0.1, -0.55, 0.0));
+    let support = physics.insert(support, ColliderBuilder::cuboid(0.21, 0.5, 0.1)).0;
     let mut world = DeformableWorld::new();
     let slab = || {
         DeformableBodyBuilder::cuboid(Vector::new(0.2, 0.05, 0.05), [4, 1, 1])
             .material(DeformableMaterial::new(1e6, 0.3).mass_damping(5.0))
     };
-    let held = world.insert(slab().translation(Vector::X).pinned(|x| x.x > 1.19)).unwrap();
+    let held = world.insert(slab().translation(Vector::X).pinned(|x| x.x > 0.79)).unwrap();
     let tied = world.insert(slab().translation(Vector::X * 0.6).pinned(|x| x.x < -10.0)).unwrap();
     let far = world.insert(slab().translation(Vector::ZERO)).unwrap();
     let end = |b: DeformableBodyHandle, side: f64, world: &DeformableWorld| {

@@ -153,7 +153,9 @@ impl DeformableBody {
         // Contacts of another mesh of the same size would name nodes that are not on this surface.
         let surface = &self.model.surface.index_of_node;
         let known = |n: &u32| surface.get(*n as usize).is_some_and(|s| *s != u32::MAX);
-        let on_surface = |c: &ContactMemory| c.nodes.iter().zip(c.weights).all(|(n, w)| w == 0.0 || known(n));
+        let on_surface = |c: &ContactMemory| {
+            c.geometry.nodes[0].iter().zip(c.geometry.weights[0]).all(|(n, w)| w == 0.0 || known(n))
+        };
         if !self.state.contacts.iter().all(on_surface) {
             self.state.contacts.clear();
         }

@@ -52,9 +52,41 @@ pub(crate) struct ContactMemory {
     pub force: Vec3,
     /// De Saxcé shift μ‖slip‖ \[m\] over the step, per second of it [m/s].
     pub shift_rate: f64,
-    /// Where on the body: nodes and their weights.
-    pub nodes: [u32; 3],
-    pub weights: [f64; 3],
+    pub geometry: ContactGeometry,
+}
+
+/// Where a contact acts: what its rows in the matrix of the contact problem are made of. While it is
+/// nearly what it was, the next step takes it as it was: at rest, where rapier's poses differ in their last
+/// digits from step to step, the matrix then stays the same to the last bit and need not be made again.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct ContactGeometry {
+    /// Of soft sides: nodes and their weights.
+    pub nodes: [[u32; 3]; 2],
+    pub weights: [[f64; 3]; 2],
+    /// Normal and tangents.
+    pub frame: [Vec3; 3],
+    /// Of rigid sides: from the centre of mass to the point \[m\].
+    pub arms: [Vec3; 2],
+}
+
+/// Part of weights, directions and arms by which a geometry may be off. What it leaves of a change of
+/// forces within an iteration is this part, for the next iteration to find.
+const NEAR: f64 = 1.0e-5;
+
+impl ContactGeometry {
+    /// Whether it serves in the place of another; `rounding` \[m\] is that of rapier's positions.
+    pub fn is_near(&self, other: &Self, rounding: f64) -> bool {
+        let near = |a: &Vec3, b: &Vec3, by: f64| (a - b).amax() <= by;
+        self.nodes == other.nodes
+            && self
+                .weights
+                .iter()
+                .flatten()
+                .zip(other.weights.iter().flatten())
+                .all(|(a, b)| (a - b).abs() <= NEAR)
+            && self.frame.iter().zip(&other.frame).all(|(a, b)| near(a, b, NEAR))
+            && self.arms.iter().zip(&other.arms).all(|(a, b)| near(a, b, NEAR * a.amax() + rounding))
+    }
 }
 
 /// Farther than this [m], or faster [m/s], is no number to rapier: its `f32` overflows in squares.

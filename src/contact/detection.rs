@@ -213,20 +213,22 @@ impl Detector {
     fn keep_points(&mut self, scene: &Scene<'_>, memory: &[ContactMemory], rows: &mut Vec<Row>) {
         let surface = &scene.model.surface;
         self.points.clear();
-        for kept in memory.iter().filter(|m| m.key.slot >= FIRST_POINT) {
-            let s = kept.nodes.map(|n| surface.index_of_node[n as usize] as usize);
+        let carried = |m: &&ContactMemory| m.key.slot >= FIRST_POINT && m.force != Vec3::zeros();
+        for kept in memory.iter().filter(carried) {
+            let (nodes, weights) = (kept.geometry.nodes[0], kept.geometry.weights[0]);
+            let s = nodes.map(|n| surface.index_of_node[n as usize] as usize);
             // A restored state may be another mesh's.
             if s.iter().any(|s| *s >= self.local.len()) {
                 continue;
             }
             let [a, b, c] = s.map(|s| self.local[s]);
-            let p = a * kept.weights[0] + b * kept.weights[1] + c * kept.weights[2];
+            let p = a * weights[0] + b * weights[1] + c * weights[2];
             let outward = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
             let reach = s.iter().fold(0.0, |a: f64, &s| a.max(self.reach[s])) + scene.motion;
             let found = surface_point(scene.obstacle, &p, &outward, &scene.scales);
             if let Some(found) = found.filter(|f| f.gap < reach && f.normal.dot(&outward) < 0.0) {
                 self.points.push((kept.key.feature, kept.key.slot, found));
-                let mut row = scene.row(kept.nodes, kept.weights, &found, kept.key.feature);
+                let mut row = scene.row(nodes, weights, &found, kept.key.feature);
                 row.key.slot = kept.key.slot;
                 rows.push(row);
             }

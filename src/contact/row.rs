@@ -1,7 +1,7 @@
 //! A contact as the solver sees it: three rows (normal and two tangents), or one without friction.
 
 use super::PartnerId;
-use crate::body::ContactKey;
+use crate::body::{ContactGeometry, ContactKey, ContactMemory};
 use crate::math::{Vec3, tangents};
 
 /// One side of a contact.
@@ -48,6 +48,8 @@ pub(crate) struct Row {
     pub warm_force: Vec3,
     /// De Saxcé shift of the last step, per second of it [m/s].
     pub warm_shift_rate: f64,
+    /// Where it acted in the last step.
+    pub warm_geometry: Option<ContactGeometry>,
 }
 
 impl Row {
@@ -63,7 +65,15 @@ impl Row {
             key,
             warm_force: Vec3::zeros(),
             warm_shift_rate: 0.0,
+            warm_geometry: None,
         }
+    }
+
+    /// Takes up what the last step has left of this contact.
+    pub fn recall(&mut self, memory: &ContactMemory) {
+        self.warm_force = memory.force;
+        self.warm_shift_rate = memory.shift_rate;
+        self.warm_geometry = Some(memory.geometry);
     }
 
     /// Rows of this contact in the solver: three, or one without friction.

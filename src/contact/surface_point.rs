@@ -176,12 +176,12 @@ fn face_or(direction: Vec3, face: Option<Vec3>) -> Vec3 {
 
 impl Projection {
     fn with(&self, p: &Vec3, normal: Vec3) -> SurfacePoint {
-        SurfacePoint {
-            point: self.point,
-            normal,
-            gap: normal.dot(&(p - self.point)),
-            flat: self.face.is_some_and(|n| n == normal || n == -normal),
-        }
+        let gap = normal.dot(&(p - self.point));
+        let flat = self.face.is_some_and(|n| n == normal || n == -normal);
+        // On a plane face the point is the foot of p: what was projected may have been shifted, and forces
+        // at different points would turn the two sides against each other.
+        let point = if flat { p - normal * gap } else { self.point };
+        SurfacePoint { point, normal, gap, flat }
     }
 }
 

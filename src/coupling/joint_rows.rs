@@ -217,11 +217,8 @@ impl Coordinate {
 
     /// Acceleration per force [1/kg], or the like about an axis.
     fn mobility(&self, partners: &Partners) -> f64 {
-        let along = [self.axis; 3];
-        let term = |a: usize, b: usize| {
-            let block = partners.compliance((&self.sides[a], &along), (&self.sides[b], &along), 1.0);
-            block.map_or(0.0, |block| block[(0, 0)])
-        };
-        term(0, 0) + term(1, 1) - term(0, 1) - term(1, 0)
+        let [first, second] = &self.sides;
+        let term = |at: &Side, by: &Side| partners.mobility(at, by, &self.axis).dot(&self.axis);
+        term(first, first) + term(second, second) - term(first, second) - term(second, first)
     }
 }

@@ -4,14 +4,14 @@ use super::articulations::{ArticulatedLinks, read_articulation};
 use super::parts::{RapierSets, packed, unpacked};
 use crate::body::DeformableBody;
 use crate::contact::{Obstacle, PartnerId};
-use crate::math::{Mat3, Pose64, Vec3, from_real, rotation_from_vector};
+use crate::math::{Mat3, Pose64, Vec3, from_real, rotation_from_vector, rounded_rotation};
 use crate::solver::{Partner, Partners, Twist};
 use parry3d::shape::{SharedShape, TypedShape};
 use rapier3d::dynamics::{
     CoefficientCombineRule, RigidBody, RigidBodyHandle, RigidBodyMassProps, RigidBodyType,
 };
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet, InteractionGroups};
-use rapier3d::math::Vector;
+use rapier3d::math::{Pose, Vector};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -263,6 +263,7 @@ fn partner_of(
                 com: from_real(masses.world_com),
                 inv_mass,
                 inv_inertia,
+                steady_inv_inertia: steady_inv_inertia(&masses, &start.rotation, &inv_inertia),
                 twist: Twist { linear: linvel, angular: angvel },
                 free: Twist {
                     linear: linvel + inv_mass.component_mul(&force) * dt,
@@ -271,6 +272,19 @@ fn partner_of(
             }
         }
     }
+}
+
+/// The inverse inertia at a rounded rotation; as it is where rotations are locked.
+fn steady_inv_inertia(masses: &RigidBodyMassProps, rotation: &Mat3, inv_inertia: &Mat3) -> Mat3 {
+    /// Binary places: rapier's rotations at rest differ in the twenty-third.
+    const PLACES: i32 = 14;
+    let local = &masses.local_mprops;
+    let frame = Pose64::from_real(&Pose::from_rotation(local.principal_inertia_local_frame)).rotation;
+    let frame = rounded_rotation(&(rotation * frame), PLACES);
+    let inertia = from_real(local.inv_principal_inertia);
+    let steady = frame * Mat3::from_diagonal(&inertia) * frame.transpose();
+    let same = (steady - inv_inertia).amax() <= 1e-3 * inv_inertia.amax();
+    if same { steady } else { *inv_inertia }
 }
 
 /// Mass properties at the current pose: a body's are zero until rapier's first step with its colliders.

@@ -84,6 +84,18 @@ pub(crate) fn rotation_vector(R: &Mat3) -> Vec3 {
     nalgebra::Rotation3::from_matrix_unchecked(*R).scaled_axis()
 }
 
+/// A rotation rounded to that many binary places of its quaternion.
+pub(crate) fn rounded_rotation(rotation: &Mat3, places: i32) -> Mat3 {
+    // Numbers next to this one are 2⁻ᵖˡᵃᶜᵉˢ apart.
+    let coarse = 1.5 * 2.0f64.powi(52 - places);
+    let R = nalgebra::Rotation3::from_matrix_unchecked(*rotation);
+    let q = nalgebra::UnitQuaternion::from_rotation_matrix(&R);
+    let rounded = q.coords.map(|c| (c + coarse) - coarse);
+    nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::from_vector(rounded))
+        .to_rotation_matrix()
+        .into_inner()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -96,8 +96,7 @@ impl BodyWork {
             let held = row.sides[0].soft_nodes().all(|(n, _)| pinned(n));
             let yields = |side: &Side| side.partner().is_some_and(|id| scene.partners.yields(id));
             if let Some(memory) = body.state.contact(&row.key) {
-                row.warm_force = memory.force;
-                row.warm_shift_rate = memory.shift_rate;
+                row.recall(memory);
             }
             !held || row.sides.iter().any(yields)
         });
@@ -190,8 +189,7 @@ impl IslandWork {
     pub fn recall_links(&mut self, state: &DeformableState) {
         for row in self.island.contacts.rows.iter_mut().filter(|row| row.key.is_link()) {
             if let Some(memory) = state.closure_row(&row.key) {
-                row.warm_force = memory.force;
-                row.warm_shift_rate = memory.shift_rate;
+                row.recall(memory);
             }
         }
     }
@@ -199,35 +197,19 @@ impl IslandWork {
     /// What closure and attachments leave to the next step, ascending by key.
     pub fn memory_of_links(&self, h: f64, memory: &mut Vec<ContactMemory>) {
         memory.clear();
-        let contacts = &self.island.contacts;
-        for (i, row) in contacts.rows.iter().enumerate().filter(|(_, row)| row.key.is_link()) {
-            let force = contacts.force(i);
-            if force != Vec3::zeros() {
-                let shift_rate = contacts.shift[i] / h;
-                memory.push(ContactMemory {
-                    key: row.key,
-                    force,
-                    shift_rate,
-                    nodes: [0; 3],
-                    weights: [0.0; 3],
-                });
-            }
-        }
+        let rows = self.island.contacts.rows.iter().enumerate();
+        let links = rows.filter(|(_, row)| row.key.is_link());
+        memory.extend(links.map(|(i, _)| self.island.contacts.memory(i, h)));
         memory.sort_unstable_by_key(|m| m.key);
     }
 
     /// What the contacts of a member leave to the next step, ascending by key.
     pub fn memory_of(&self, member: usize, h: f64, memory: &mut Vec<ContactMemory>) {
         memory.clear();
-        let contacts = &self.island.contacts;
-        for (i, row) in contacts.rows.iter().enumerate() {
-            let Side::Soft { body, nodes, weights } = row.sides[0] else { continue };
-            let force = contacts.force(i);
-            if body == member && !row.key.is_link() && force != Vec3::zeros() {
-                let shift_rate = contacts.shift[i] / h;
-                memory.push(ContactMemory { key: row.key, force, shift_rate, nodes, weights });
-            }
-        }
+        let rows = self.island.contacts.rows.iter().enumerate();
+        let own = |row: &Row| matches!(row.sides[0], Side::Soft { body, .. } if body == member);
+        let own = rows.filter(|(_, row)| own(row) && !row.key.is_link());
+        memory.extend(own.map(|(i, _)| self.island.contacts.memory(i, h)));
         memory.sort_unstable_by_key(|m| m.key);
     }
 }

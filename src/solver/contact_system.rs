@@ -1,4 +1,4 @@
-//! The contacts of an island as a cone problem: `W = J P Jᵀ + h² J M⁻¹ Jᵀ`, gaps, warm starts.
+//! The contacts of an island as a cone problem: gaps, warm starts, goals, and the forces on both sides.
 //!
 //! Directions stay fixed within a step, and W unless a body's frame or scaling changes; gaps are taken
 //! anew in every iteration.
@@ -6,10 +6,12 @@
 use super::body_problem::BodyProblem;
 use super::cone_newton::{ConeProblem, ConeSolver, ConeTolerance, ConeWork};
 use super::contact_groups::ContactGroups;
-use super::factor_cache::{FactorCache, SystemFactor};
-use super::partner::{Partner, Partners, Reaction};
+use super::delassus::{ContactRows, Delassus, steady_geometry};
+use super::factor_cache::FactorCache;
+use super::partner::{Partners, Reaction};
+use crate::body::{ContactGeometry, ContactMemory};
 use crate::contact::{Law, Row, Side};
-use crate::math::{Mat3, Vec3};
+use crate::math::Vec3;
 
 /// Contacts of the bodies of one island.
 #[derive(Default)]
@@ -17,8 +19,6 @@ pub(crate) struct ContactSystem {
     pub rows: Vec<Row>,
     problem: ConeProblem,
     groups: ContactGroups,
-    /// First row of each group, and the number of rows last.
-    starts: Vec<usize>,
     solver: ConeSolver,
     /// Forces \[N\], packed as the problem is.
     pub lambda: Vec<f64>,
@@ -31,85 +31,9 @@ pub(crate) struct ContactSystem {
     slips: Vec<f64>,
     before: Vec<f64>,
     reactions: Vec<Reaction>,
-    /// What W was made of, and memory for what it is to be made of next.
-    made_from: Ingredients,
-    fresh: Ingredients,
-}
-
-/// Everything that W depends on.
-#[derive(Default, PartialEq)]
-struct Ingredients {
-    bits: Vec<f64>,
-    nodes: Vec<u32>,
-    /// Serial numbers.
-    factors: Vec<u64>,
-    /// Frames per node are too many to compare.
-    comparable: bool,
-}
-
-impl Ingredients {
-    fn describe(
-        &mut self,
-        rows: &[Row],
-        bodies: &[BodyProblem],
-        factors: &FactorCache,
-        partners: &Partners,
-        h: f64,
-    ) {
-        self.bits.clear();
-        self.nodes.clear();
-        self.comparable = bodies.iter().all(|b| !b.metric.is_per_node());
-        if !self.comparable {
-            return;
-        }
-        self.factors.clear();
-        self.factors.extend(bodies.iter().map(|b| factors.get(b.factor).serial));
-        self.bits.push(h);
-        for articulation in &partners.articulations {
-            self.bits.extend(articulation.blocks.iter().flat_map(|b| b.iter()));
-        }
-        for body in bodies {
-            self.bits.push(body.scaling);
-            self.bits.extend(body.metric.floating_frame().iter());
-        }
-        for row in rows {
-            self.bits.push(row.compliance);
-            self.bits.extend(row.directions().iter().flat_map(|d| d.iter()));
-            for side in &row.sides {
-                match side {
-                    Side::Soft { body, nodes, weights } => {
-                        self.nodes.push(*body as u32);
-                        self.nodes.extend(nodes);
-                        self.bits.extend(weights);
-                    }
-                    Side::Partner { partner, point } => {
-                        self.nodes.push(partner.0);
-                        // Where it is touched does not matter to what does not yield.
-                        if partners.yields(*partner) {
-                            self.bits.extend(point.iter());
-                        }
-                        self.describe_partner(partners.get(*partner));
-                    }
-                    Side::Turn { partner } => {
-                        self.nodes.push(partner.0);
-                        self.describe_partner(partners.get(*partner));
-                    }
-                }
-            }
-        }
-    }
-}
-
-impl Ingredients {
-    fn describe_partner(&mut self, partner: &Partner) {
-        match partner {
-            Partner::Prescribed { .. } => {}
-            Partner::Rigid { com, inv_mass, inv_inertia, .. } => {
-                self.bits.extend(com.iter().chain(inv_mass).chain(inv_inertia));
-            }
-            Partner::Link { com, .. } => self.bits.extend(com.iter()),
-        }
-    }
+    /// Where each contact acts, for W.
+    geometry: Vec<ContactGeometry>,
+    delassus: Delassus,
 }
 
 /// Limits that the user sets per world.
@@ -140,7 +64,9 @@ impl ContactSystem {
         self.lambda.clear();
         self.shift.clear();
         self.goals.clear();
+        self.geometry.clear();
         for row in &self.rows {
+            self.geometry.push(steady_geometry(row, partners));
             self.lambda.extend(row.directions().iter().map(|d| d.dot(&row.warm_force)));
             self.shift.push(row.warm_shift_rate * h);
             self.problem.offsets.push(self.lambda.len());
@@ -153,49 +79,17 @@ impl ContactSystem {
     /// Assembles W for the current frames and scalings of the bodies, unless the last one was made of
     /// the same bits: so it is at rest.
     pub fn assemble(&mut self, bodies: &[BodyProblem], factors: &FactorCache, partners: &Partners, h: f64) {
-        let mut made_from = std::mem::take(&mut self.fresh);
-        made_from.describe(&self.rows, bodies, factors, partners, h);
-        if made_from.comparable && made_from == self.made_from {
-            self.fresh = made_from;
-            return self.problem.multiply(&self.lambda, &mut self.slips);
+        let rows = ContactRows {
+            rows: &self.rows,
+            geometry: &self.geometry,
+            offsets: &self.problem.offsets,
+            groups: &self.groups,
+        };
+        if self.delassus.update(&mut self.problem.W, &rows, bodies, factors, partners, h) {
+            self.problem.groups.clone_from(&self.groups.starts);
+            self.problem.filled.clone_from(&self.groups.filled);
+            self.problem.version += 1;
         }
-        self.fresh = std::mem::replace(&mut self.made_from, made_from);
-        let mut W = std::mem::take(&mut self.problem.W);
-        let (offsets, groups) = (&self.problem.offsets, &self.groups);
-        self.starts.clear();
-        self.starts.extend(groups.starts.iter().map(|&contact| offsets[contact]));
-        W.reset(&self.starts, &groups.coupled);
-        for (k, &(gi, gj)) in groups.coupled.iter().enumerate() {
-            let (first_row, first_column) = (self.starts[gi], self.starts[gj]);
-            let m = self.starts[gi + 1] - first_row;
-            let values = W.block_mut(k);
-            for j in groups.starts[gj]..groups.starts[gj + 1] {
-                // The diagonal's blocks are symmetric.
-                let from = if gi == gj { j } else { groups.starts[gi] };
-                for i in from..groups.starts[gi + 1] {
-                    let (a, b) = (&self.rows[i], &self.rows[j]);
-                    let block = compliance(a, b, bodies, factors, partners, h);
-                    let Some(block) = block else { continue };
-                    let (row, column) = (offsets[i] - first_row, offsets[j] - first_column);
-                    for c in 0..b.dimension() {
-                        for r in 0..a.dimension() {
-                            values[(column + c) * m + row + r] = block[(r, c)];
-                            if gi == gj {
-                                values[(row + r) * m + column + c] = block[(r, c)];
-                            }
-                        }
-                    }
-                }
-                if gi == gj {
-                    let own = offsets[j] - first_row;
-                    values[own * m + own] += self.rows[j].compliance;
-                }
-            }
-        }
-        self.problem.W = W;
-        self.problem.groups.clone_from(&groups.starts);
-        self.problem.filled.clone_from(&groups.filled);
-        self.problem.version += 1;
         self.problem.multiply(&self.lambda, &mut self.slips);
     }
 
@@ -294,6 +188,12 @@ impl ContactSystem {
         self.rows[i].force(&self.lambda[self.problem.offsets[i]..self.problem.offsets[i + 1]])
     }
 
+    /// What contact `i` leaves to the next step.
+    pub fn memory(&self, i: usize, h: f64) -> ContactMemory {
+        let (key, geometry) = (self.rows[i].key, self.geometry[i]);
+        ContactMemory { key, force: self.force(i), shift_rate: self.shift[i] / h, geometry }
+    }
+
     /// Gap \[m\] of contact `i` at the end of the step.
     pub fn final_gap(&self, i: usize) -> f64 {
         let normal = self.problem.offsets[i];
@@ -353,51 +253,4 @@ fn relative_motion(
         _ => partners.displacement(side, reactions, h),
     };
     moved(&row.sides[0]) - moved(&row.sides[1])
-}
-
-/// The block of W between two contacts; `None` if they have nothing in common.
-fn compliance(
-    a: &Row,
-    b: &Row,
-    bodies: &[BodyProblem],
-    factors: &FactorCache,
-    partners: &Partners,
-    h: f64,
-) -> Option<Mat3> {
-    let mut sum = None;
-    for (side_a, sign_a) in a.sides.iter().zip([1.0, -1.0]) {
-        for (side_b, sign_b) in b.sides.iter().zip([1.0, -1.0]) {
-            let term = match (side_a, side_b) {
-                (Side::Soft { body: i, .. }, Side::Soft { body: j, .. }) if i == j => {
-                    soft_compliance(side_a, side_b, a, b, &bodies[*i], factors.get(bodies[*i].factor))
-                }
-                _ => match partners.compliance((side_a, &a.frame), (side_b, &b.frame), h) {
-                    Some(block) => block,
-                    None => continue,
-                },
-            };
-            *sum.get_or_insert(Mat3::zeros()) += term * (sign_a * sign_b);
-        }
-    }
-    sum
-}
-
-fn soft_compliance(
-    side_a: &Side,
-    side_b: &Side,
-    a: &Row,
-    b: &Row,
-    body: &BodyProblem,
-    factor: &SystemFactor,
-) -> Mat3 {
-    let index = &body.model.surface.index_of_node;
-    let mut block = Mat3::zeros();
-    for (i, wa) in side_a.soft_nodes() {
-        for (j, wb) in side_b.soft_nodes() {
-            let inverse = factor.columns.block(index[i] as usize, index[j] as usize);
-            block += body.metric.compliance(&inverse, i, j) * (wa * wb / body.scaling);
-        }
-    }
-    let (A, B) = (Mat3::from_columns(&a.frame), Mat3::from_columns(&b.frame));
-    A.tr_mul(&(block * B))
 }

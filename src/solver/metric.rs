@@ -13,8 +13,11 @@ use super::factor_cache::SystemFactor;
 use super::system::dimension;
 use crate::body::elastic::node_rotations;
 use crate::body::{DeformableModel, SystemMatrix};
-use crate::math::{Mat3, Vec3};
+use crate::math::{Mat3, Vec3, rounded_rotation};
 use std::time::Instant;
+
+/// Binary places of the frames' quaternions.
+const FRAME_BITS: i32 = 20;
 
 /// Frames of one body and what follows from them.
 #[derive(Default)]
@@ -67,7 +70,7 @@ impl Metric {
     /// One frame for the body.
     pub fn set_floating(&mut self, rotation: &Mat3) {
         self.kind = FrameKind::Floating;
-        self.floating = rounded(rotation);
+        self.floating = rounded_rotation(rotation, FRAME_BITS);
         self.deflation.active = false;
     }
 
@@ -98,7 +101,7 @@ impl Metric {
         self.kind = FrameKind::PerNode;
         self.per_node.resize(x.len(), Mat3::zeros());
         node_rotations(model, x, &mut self.per_node);
-        self.per_node.iter_mut().for_each(|q| *q = rounded(q));
+        self.per_node.iter_mut().for_each(|q| *q = rounded_rotation(q, FRAME_BITS));
         self.deflation.active = is_free;
         if is_free {
             self.refresh_deflation(masses, mobility, factor);
@@ -212,10 +215,11 @@ impl Metric {
     }
 
     /// The one frame of the body, if it has one.
-    pub fn floating_frame(&self) -> Mat3 {
+    pub fn one_frame(&self) -> Option<Mat3> {
         match self.kind {
-            FrameKind::Floating => self.floating,
-            FrameKind::Isotropic | FrameKind::PerNode => Mat3::zeros(),
+            FrameKind::Isotropic => Some(Mat3::identity()),
+            FrameKind::Floating => Some(self.floating),
+            FrameKind::PerNode => None,
         }
     }
 
@@ -223,16 +227,4 @@ impl Metric {
     pub fn is_per_node(&self) -> bool {
         self.kind == FrameKind::PerNode
     }
-}
-
-/// A rotation rounded to quaternion components of 2⁻²⁰.
-fn rounded(rotation: &Mat3) -> Mat3 {
-    // Numbers next to this one are 2⁻²⁰ apart.
-    const COARSE: f64 = 1.5 * (1u64 << 32) as f64;
-    let R = nalgebra::Rotation3::from_matrix_unchecked(*rotation);
-    let q = nalgebra::UnitQuaternion::from_rotation_matrix(&R);
-    let coarse = q.coords.map(|c| (c + COARSE) - COARSE);
-    nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::from_vector(coarse))
-        .to_rotation_matrix()
-        .into_inner()
 }

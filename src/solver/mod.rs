@@ -10,6 +10,7 @@ mod cone_hessian;
 mod cone_newton;
 mod contact_groups;
 mod contact_system;
+mod delassus;
 mod effort;
 mod factor;
 mod factor_cache;

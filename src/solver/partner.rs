@@ -25,6 +25,8 @@ pub(crate) enum Partner {
         inv_mass: Vec3,
         /// In the world [1/(kg m²)].
         inv_inertia: Mat3,
+        /// The same at a rounded rotation: at rest the same bits in every step.
+        steady_inv_inertia: Mat3,
         /// At the start of the step.
         twist: Twist,
         /// At its end if nothing touched the body.
@@ -61,7 +63,7 @@ pub(crate) struct Reaction {
 }
 
 impl Partner {
-    fn com(&self) -> Vec3 {
+    pub fn com(&self) -> Vec3 {
         match self {
             Self::Prescribed { .. } => Vec3::zeros(),
             Self::Rigid { com, .. } | Self::Link { com, .. } => *com,
@@ -69,7 +71,7 @@ impl Partner {
     }
 
     /// Force and moment about the centre of mass of a unit along `d` at a side.
-    fn wrench(&self, side: &Side, d: &Vec3) -> [Vec3; 2] {
+    pub fn wrench(&self, side: &Side, d: &Vec3) -> [Vec3; 2] {
         match side {
             Side::Partner { point, .. } => [*d, (point - self.com()).cross(d)],
             Side::Turn { .. } | Side::Soft { .. } => [Vec3::zeros(), *d],
@@ -164,39 +166,29 @@ impl Partners {
         }
     }
 
-    /// `h²·D_aᵀ J M⁻¹ Jᵀ D_b`: displacement at side `a` along its directions per force at side `b` along
-    /// its own; `None` if one does not move the other.
-    pub fn compliance(
-        &self,
-        (a, along_a): (&Side, &[Vec3; 3]),
-        (b, along_b): (&Side, &[Vec3; 3]),
-        h: f64,
-    ) -> Option<Mat3> {
-        let (i, j) = (a.partner()?, b.partner()?);
-        let (p, q) = (self.get(i), self.get(j));
-        let block = match (p, q) {
+    /// Velocity that an impulse at side `by` gives to side `at`, for each unit along `direction`.
+    pub fn mobility(&self, at: &Side, by: &Side, direction: &Vec3) -> Vec3 {
+        let (Some(i), Some(j)) = (at.partner(), by.partner()) else { return Vec3::zeros() };
+        let (moved, pushed) = (self.get(i), self.get(j));
+        let [force, moment] = pushed.wrench(by, direction);
+        let twist = match (moved, pushed) {
             (Partner::Rigid { inv_mass, inv_inertia, .. }, Partner::Rigid { .. }) if i == j => {
-                if !p.yields() {
-                    return None;
-                }
-                let b = along_b.map(|d| q.wrench(b, &d));
-                let moved = b.map(|[f, m]| [inv_mass.component_mul(&f), inv_inertia * m]);
-                let a = along_a.map(|d| p.wrench(a, &d));
-                Mat3::from_fn(|r, c| a[r][0].dot(&moved[c][0]) + a[r][1].dot(&moved[c][1]))
+                Twist { linear: inv_mass.component_mul(&force), angular: inv_inertia * moment }
             }
             (
                 Partner::Link { articulation, slot, .. },
                 Partner::Link { articulation: other, slot: from, .. },
             ) if articulation == other => {
                 let Articulation { links, blocks } = &self.articulations[*articulation];
-                let C = &blocks[slot * links.len() + from];
-                let moved = along_b.map(|d| C * stacked(&q.wrench(b, &d)));
-                let a = along_a.map(|d| stacked(&p.wrench(a, &d)));
-                Mat3::from_fn(|r, c| a[r].dot(&moved[c]))
+                let gained = blocks[slot * links.len() + from] * stacked(&[force, moment]);
+                Twist {
+                    linear: gained.fixed_rows::<3>(0).into_owned(),
+                    angular: gained.fixed_rows::<3>(3).into_owned(),
+                }
             }
-            _ => return None,
+            _ => Twist::default(),
         };
-        Some(block * (h * h))
+        moved.at(at, &twist)
     }
 
     /// Adds a force \[N\] (or moment \[N m\]) that acts over a step at a side.
@@ -222,6 +214,7 @@ fn prescribed(side: &Side, start: &Pose64, end: &Pose64) -> Vec3 {
     }
 }
 
-fn stacked([a, b]: &[Vec3; 2]) -> Vector6<f64> {
+/// Force and moment, or their like, in one.
+pub(crate) fn stacked([a, b]: &[Vec3; 2]) -> Vector6<f64> {
     Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
 }

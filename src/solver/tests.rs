@@ -297,6 +297,7 @@ fn plate() -> Partners {
         com: Vec3::new(0.1, -0.3, 0.05),
         inv_mass: Vec3::repeat(1.0 / 30.0),
         inv_inertia: Mat3::from_diagonal(&Vec3::new(1.0, 0.7, 1.3)),
+        steady_inv_inertia: Mat3::from_diagonal(&Vec3::new(1.0, 0.7, 1.3)),
         twist: Twist { linear: Vec3::y() * 0.5, angular: Vec3::new(0.1, 0.2, -0.3) },
         free: Twist { linear: Vec3::y() * 0.4, angular: Vec3::new(0.1, 0.2, -0.3) },
     };
