@@ -2,7 +2,7 @@
 
 use crate::math::lanes::{LANES, Lane};
 use crate::math::{Mat3, Vec3};
-use crate::mesh::{Surface, TetMesh, nested_dissection, node_adjacency};
+use crate::mesh::{Surface, TetMesh, node_adjacency, sweep_order};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Everything about a body that its motion and its material do not change. Made once per mesh and
@@ -49,8 +49,7 @@ impl DeformableModel {
     /// Prepares a mesh for simulation.
     pub fn new(mesh: &TetMesh) -> Self {
         let at_rest: Vec<Vec3> = mesh.vertices().iter().map(|&v| v.into()).collect();
-        let adjacency = node_adjacency(mesh.tetrahedra(), at_rest.len());
-        let vertex_of_node = nested_dissection(&at_rest, &adjacency);
+        let vertex_of_node = sweep_order(&at_rest);
         let mut node_of_vertex = vec![0; at_rest.len()];
         for (node, &vertex) in vertex_of_node.iter().enumerate() {
             node_of_vertex[vertex as usize] = node as u32;

@@ -10,7 +10,7 @@ mod ordering;
 mod surface;
 mod tet_mesh;
 
-pub(crate) use ordering::{nested_dissection, node_adjacency};
+pub(crate) use ordering::{node_adjacency, sweep_order};
 pub(crate) use surface::Surface;
 pub(crate) use tet_mesh::signed_volume;
 pub use tet_mesh::{MeshError, TetMesh};

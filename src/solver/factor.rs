@@ -3,7 +3,7 @@
 //! All solves are sequential (`Par::Seq`): faer's threads cost more than small supernodes are
 //! worth, and parallelism is over bodies. Everything works in memory the caller owns.
 
-use super::triangular::{Entry, Supernodes};
+use super::triangular::{Entry, Supernodes, Values};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::matmul;
@@ -27,32 +27,33 @@ pub(crate) struct Symbolic {
     pattern: SymbolicSparseColMat<usize>,
     cholesky: SymbolicCholesky<usize>,
     supernodes: Supernodes,
-    /// Old index at each new place.
+    /// Old index at each new place, and the other way round.
     order: Vec<usize>,
+    places: Vec<usize>,
 }
 
 /// A numeric factor `A = L Lᵀ`. Solves are in double precision with either.
 #[derive(Debug)]
 pub(crate) enum Factor {
-    Double(Vec<f64>),
+    Double(Values<f64>),
     /// Computed in double precision, then rounded: what it solves is a matrix that differs from A by
     /// 6e-8 of its norm, with half the bytes to read.
-    Single(Vec<f32>),
+    Single(Values<f32>),
 }
 
 impl Factor {
     /// The same in single precision.
     pub fn rounded(self) -> Self {
         match self {
-            Self::Double(values) => Self::Single(values.iter().map(|&l| l as f32).collect()),
+            Self::Double(values) => Self::Single(values.rounded()),
             single => single,
         }
     }
 
     pub fn bytes(&self) -> usize {
         match self {
-            Self::Double(values) => size_of_val(values.as_slice()),
-            Self::Single(values) => size_of_val(values.as_slice()),
+            Self::Double(values) => values.bytes(),
+            Self::Single(values) => values.bytes(),
         }
     }
 }
@@ -88,8 +89,8 @@ impl Symbolic {
         );
         let cholesky = cholesky.ok()?;
         let supernodes = supernodes_of(&cholesky);
-        let order = cholesky.perm().map(|p| p.arrays().0.to_vec())?;
-        Some(Self { pattern, cholesky, supernodes, order })
+        let (order, places) = cholesky.perm().map(|p| p.arrays()).map(|(o, p)| (o.to_vec(), p.to_vec()))?;
+        Some(Self { pattern, cholesky, supernodes, order, places })
     }
 
     pub fn column_starts(&self) -> &[usize] {
@@ -125,26 +126,24 @@ impl Symbolic {
                 Spec::default(),
             )
             .map_err(|_| NotPositiveDefinite)?;
-        Ok(Factor::Double(factor))
+        Ok(Factor::Double(Values::new(factor, &self.supernodes)))
     }
 
-    /// Solves `A X = B` in place; `rhs` holds the columns of B one after the other.
-    pub fn solve(&self, factor: &Factor, rhs: &mut [f64], scratch: &mut FactorScratch) {
-        let FactorScratch { ordered, gathered, .. } = scratch;
-        for column in rhs.chunks_exact_mut(self.order.len()) {
-            ordered.clear();
-            ordered.extend(self.order.iter().map(|&old| column[old]));
-            match factor {
-                Factor::Double(values) => self.supernodes.solve(values, ordered, gathered),
-                Factor::Single(values) => self.supernodes.solve(values, ordered, gathered),
-            }
-            for (&old, x) in self.order.iter().zip(ordered.iter()) {
-                column[old] = *x;
-            }
+    /// Place of each unknown in the order of elimination.
+    pub fn places(&self) -> &[usize] {
+        &self.places
+    }
+
+    /// Solves `A x = b` in place, for a right-hand side in the order of elimination.
+    pub fn solve(&self, factor: &Factor, x: &mut [f64], scratch: &mut FactorScratch) {
+        match factor {
+            Factor::Double(values) => self.supernodes.solve(values, x, &mut scratch.gathered),
+            Factor::Single(values) => self.supernodes.solve(values, x, &mut scratch.gathered),
         }
     }
 
-    /// As [`Symbolic::solve`], for many columns at once, of which most numbers may be zero.
+    /// Solves for many columns at once, one after the other in their own order, of which most numbers may
+    /// be zero.
     pub fn solve_batch(&self, factor: &Factor, rhs: &mut [f64], columns: usize, scratch: &mut FactorScratch) {
         let n = self.order.len();
         let mut ordered = std::mem::take(&mut scratch.ordered);
@@ -153,8 +152,8 @@ impl Symbolic {
             ordered.extend(self.order.iter().map(|&old| column[old]));
         }
         match factor {
-            Factor::Double(values) => self.solve_panels(values, &mut ordered, columns, scratch),
-            Factor::Single(values) => self.solve_panels(values, &mut ordered, columns, scratch),
+            Factor::Double(values) => self.solve_panels(&values.L, &mut ordered, columns, scratch),
+            Factor::Single(values) => self.solve_panels(&values.L, &mut ordered, columns, scratch),
         }
         for (column, x) in rhs.chunks_exact_mut(n).zip(ordered.chunks_exact(n)) {
             for (&old, x) in self.order.iter().zip(x) {
@@ -319,8 +318,13 @@ mod tests {
             let mut scratch = FactorScratch::default();
             let symbolic = Symbolic::new(n, starts, rows).unwrap();
             let factor = symbolic.factorize(&values, &mut scratch).unwrap();
-            let mut sparse = b.clone();
-            symbolic.solve(&factor, &mut sparse, &mut scratch);
+            let mut sparse = vec![0.0; n * columns];
+            for (x, b) in sparse.chunks_exact_mut(n).zip(b.chunks_exact(n)) {
+                let mut ordered = vec![0.0; n];
+                (0..n).for_each(|i| ordered[symbolic.places()[i]] = b[i]);
+                symbolic.solve(&factor, &mut ordered, &mut scratch);
+                (0..n).for_each(|i| x[i] = ordered[symbolic.places()[i]]);
+            }
             let mut batch = b.clone();
             symbolic.solve_batch(&factor, &mut batch, columns, &mut scratch);
             for k in 0..n * columns { prop_assert!((sparse[k] - x[k]).abs() < 1e-13 && (batch[k] - x[k]).abs() < 1e-13); }

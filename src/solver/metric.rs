@@ -160,28 +160,24 @@ impl Metric {
     fn rotate_and_solve(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
         let start = Instant::now();
         let n = r.len();
-        self.rhs.resize(3 * n, 0.0);
-        match factor.system {
-            SystemMatrix::Laplacian => {
-                for i in 0..n {
-                    for c in 0..3 {
-                        self.rhs[n * c + i] = r[i][c];
-                    }
-                }
-                factor.symbolic.solve(&factor.factor, &mut self.rhs, &mut self.scratch);
-                for i in 0..n {
-                    out[i] = Vec3::new(self.rhs[i], self.rhs[n + i], self.rhs[2 * n + i]);
+        let Self { rhs, scratch, .. } = self;
+        let (symbolic, places) = (&factor.symbolic, factor.symbolic.places());
+        match (factor.system, self.kind) {
+            (SystemMatrix::Laplacian, _) => {
+                rhs.resize(n, 0.0);
+                for c in 0..3 {
+                    r.iter().zip(places).for_each(|(r, &place)| rhs[place] = r[c]);
+                    symbolic.solve(&factor.factor, rhs, scratch);
+                    out.iter_mut().zip(places).for_each(|(out, &place)| out[c] = rhs[place]);
                 }
             }
-            SystemMatrix::RestStiffness => {
-                for i in 0..n {
-                    let turned = self.frame(i).tr_mul(&r[i]);
-                    self.rhs[3 * i..3 * i + 3].copy_from_slice(turned.as_slice());
-                }
-                factor.symbolic.solve(&factor.factor, &mut self.rhs, &mut self.scratch);
-                for i in 0..n {
-                    out[i] = self.frame(i) * Vec3::from_column_slice(&self.rhs[3 * i..3 * i + 3]);
-                }
+            (SystemMatrix::RestStiffness, FrameKind::PerNode) => {
+                let frames = &self.per_node;
+                solve_turned(factor, |i| &frames[i], r, out, rhs, scratch);
+            }
+            (SystemMatrix::RestStiffness, _) => {
+                let frame = &self.floating;
+                solve_turned(factor, |_| frame, r, out, rhs, scratch);
             }
         }
         let right_hand_sides = 3 / dimension(factor.system);
@@ -226,5 +222,26 @@ impl Metric {
     /// Whether every node has a frame of its own, as in bodies that bend.
     pub fn is_per_node(&self) -> bool {
         self.kind == FrameKind::PerNode
+    }
+}
+
+/// `out = Q A⁻¹ Qᵀ r` with a frame per node.
+fn solve_turned<'a>(
+    factor: &SystemFactor,
+    frame: impl Fn(usize) -> &'a Mat3,
+    r: &[Vec3],
+    out: &mut [Vec3],
+    rhs: &mut Vec<f64>,
+    scratch: &mut FactorScratch,
+) {
+    rhs.resize(3 * r.len(), 0.0);
+    let places = factor.symbolic.places();
+    for (i, (r, places)) in r.iter().zip(places.chunks_exact(3)).enumerate() {
+        let turned = frame(i).tr_mul(r);
+        (0..3).for_each(|c| rhs[places[c]] = turned[c]);
+    }
+    factor.symbolic.solve(&factor.factor, rhs, scratch);
+    for (i, (out, places)) in out.iter_mut().zip(places.chunks_exact(3)).enumerate() {
+        *out = frame(i) * Vec3::new(rhs[places[0]], rhs[places[1]], rhs[places[2]]);
     }
 }
