@@ -55,8 +55,8 @@ pub use error::{DeformableBodyError, HandleError};
 pub use material::{DeformableMaterial, MaterialError};
 pub use mesh::{MeshError, TetMesh};
 pub use pipeline::{
-    DeformableContact, DeformableCounters, DeformableParameters, DeformablePipeline, DeformableWorld,
-    JointForce, JointRole, RigidContact, SolvedJoint,
+    DeformableContact, DeformableCounters, DeformablePairContact, DeformableParameters, DeformablePipeline,
+    DeformableWorld, JointForce, JointRole, RigidContact, SolvedJoint,
 };
 
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
@@ -64,9 +64,10 @@ pub mod prelude {
     pub use crate::{
         Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
         DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
-        DeformableContact, DeformableCounters, DeformableMaterial, DeformableModel, DeformableParameters,
-        DeformablePipeline, DeformableWorld, Elasticity, FactorPrecision, Frames, JointForce, JointRole,
-        PhysicsParts, RigidContact, SolvedJoint, SolverSettings, SystemMatrix, TetMesh,
+        DeformableContact, DeformableCounters, DeformableMaterial, DeformableModel, DeformablePairContact,
+        DeformableParameters, DeformablePipeline, DeformableWorld, Elasticity, FactorPrecision, Frames,
+        JointForce, JointRole, PhysicsParts, RigidContact, SolvedJoint, SolverSettings, SystemMatrix,
+        TetMesh,
     };
 }
 

@@ -97,6 +97,7 @@ pub struct DeformableBody {
     gravity_scale: f64,
     enabled: bool,
     pub(super) can_sleep: bool,
+    self_contact: bool,
     collision_groups: InteractionGroups,
     friction_combine_rule: CoefficientCombineRule,
     restitution_combine_rule: CoefficientCombineRule,
@@ -124,6 +125,7 @@ impl DeformableBody {
             gravity_scale: 1.0,
             enabled: true,
             can_sleep: true,
+            self_contact: false,
             collision_groups: InteractionGroups::all(),
             friction_combine_rule: CoefficientCombineRule::Average,
             restitution_combine_rule: CoefficientCombineRule::Average,
@@ -489,7 +491,18 @@ impl DeformableBody {
         self.report.quarantined
     }
 
-    /// Which colliders the body collides with, by rapier's rules.
+    /// Whether the body collides with itself.
+    pub fn self_contact(&self) -> bool {
+        self.self_contact
+    }
+
+    /// Lets the body collide with itself: for slender ones, which may fold.
+    pub fn set_self_contact(&mut self, self_contact: bool) {
+        self.wake_up();
+        self.self_contact = self_contact;
+    }
+
+    /// Which colliders and deformable bodies the body collides with, by rapier's rules.
     pub fn collision_groups(&self) -> InteractionGroups {
         self.collision_groups
     }

@@ -39,6 +39,7 @@ pub struct DeformableBodyBuilder {
     gravity_scale: f64,
     enabled: bool,
     can_sleep: bool,
+    self_contact: bool,
     collision_groups: InteractionGroups,
     friction_combine_rule: CoefficientCombineRule,
     restitution_combine_rule: CoefficientCombineRule,
@@ -90,6 +91,7 @@ impl DeformableBodyBuilder {
             gravity_scale: 1.0,
             enabled: true,
             can_sleep: true,
+            self_contact: false,
             collision_groups: InteractionGroups::all(),
             friction_combine_rule: CoefficientCombineRule::Average,
             restitution_combine_rule: CoefficientCombineRule::Average,
@@ -163,6 +165,12 @@ impl DeformableBodyBuilder {
         self
     }
 
+    /// Whether the body collides with itself. Off by default: compact bodies hardly can.
+    pub fn self_contact(mut self, self_contact: bool) -> Self {
+        self.self_contact = self_contact;
+        self
+    }
+
     /// Sets which colliders the body collides with.
     pub fn collision_groups(mut self, groups: InteractionGroups) -> Self {
         self.collision_groups = groups;
@@ -200,6 +208,7 @@ impl DeformableBodyBuilder {
         body.set_gravity_scale(self.gravity_scale);
         body.set_enabled(self.enabled);
         body.set_can_sleep(self.can_sleep);
+        body.set_self_contact(self.self_contact);
         body.set_collision_groups(self.collision_groups);
         body.set_friction_combine_rule(self.friction_combine_rule);
         body.set_restitution_combine_rule(self.restitution_combine_rule);

@@ -24,4 +24,4 @@ pub use set::{DeformableBodyHandle, DeformableBodySet};
 pub use settings::{Acceleration, FactorPrecision, Frames, SolverSettings, SystemMatrix};
 pub(crate) use sleep::{Surroundings, TIME_UNTIL_SLEEP};
 pub use state::DeformableState;
-pub(crate) use state::{ContactGeometry, ContactKey, ContactMemory, FIRST_LINK_SLOT, is_number};
+pub(crate) use state::{ContactGeometry, ContactKey, ContactMemory, FIRST_LINK_SLOT, SOFT_SLOT, is_number};

@@ -1,6 +1,7 @@
 //! Bodies that lie still for a while are not stepped until something about them changes.
 
 use super::body::DeformableBody;
+use super::set::DeformableBodyHandle;
 use crate::math::{Pose64, Vec3};
 
 /// Speed [m/s] below which a vertex counts as still.
@@ -21,9 +22,18 @@ pub(crate) struct Sleep {
 pub(crate) struct Surroundings {
     /// Key, part, and pose of the obstacles near it.
     pub obstacles: Vec<(u64, u32, Pose64)>,
+    /// Bodies that fell asleep with it, because they touched.
+    pub mates: Vec<DeformableBodyHandle>,
     pub gravity: Vec3,
     /// Length of the step \[s\].
     pub dt: f64,
+}
+
+impl Surroundings {
+    /// Whether the things around are those of another time.
+    pub fn is_around(&self, other: &Self) -> bool {
+        self.obstacles == other.obstacles && self.gravity == other.gravity && self.dt == other.dt
+    }
 }
 
 impl DeformableBody {

@@ -37,7 +37,15 @@ pub(crate) struct ContactKey {
 /// attachments.
 pub(crate) const FIRST_LINK_SLOT: u32 = u32::MAX - 15;
 
+/// Slots from here to the links name contacts between deformable bodies.
+pub(crate) const SOFT_SLOT: u32 = FIRST_LINK_SLOT - 16;
+
 impl ContactKey {
+    /// Whether it names a contact between deformable bodies.
+    pub fn is_between(&self) -> bool {
+        (SOFT_SLOT..FIRST_LINK_SLOT).contains(&self.slot)
+    }
+
     /// Whether it names a row that belongs to an island and not to one body.
     pub fn is_link(&self) -> bool {
         self.slot >= FIRST_LINK_SLOT

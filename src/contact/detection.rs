@@ -19,7 +19,7 @@ pub(crate) struct Pair {
 }
 
 /// Part of the mean edge within which contacts are looked for even without motion.
-const STATIC_MARGIN: f64 = 0.05;
+pub(crate) const STATIC_MARGIN: f64 = 0.05;
 /// Part of the mean edge by which nodes are shifted back to tell inside from outside.
 const SHIFT: f64 = 0.1;
 /// Part of the body's size within which a projection's direction is not trusted.
@@ -31,8 +31,8 @@ const FIRST_POINT: u32 = 1;
 #[derive(Default)]
 pub(crate) struct Detector {
     /// Per surface node, in the world: normal, and how far the node may come.
-    normals: Vec<Vec3>,
-    reach: Vec<f64>,
+    pub normals: Vec<Vec3>,
+    pub reach: Vec<f64>,
     /// Per surface node, in the obstacle's frame.
     local: Vec<Vec3>,
     nodes: Vec<Option<SurfacePoint>>,
@@ -213,7 +213,8 @@ impl Detector {
     fn keep_points(&mut self, scene: &Scene<'_>, memory: &[ContactMemory], rows: &mut Vec<Row>) {
         let surface = &scene.model.surface;
         self.points.clear();
-        let carried = |m: &&ContactMemory| m.key.slot >= FIRST_POINT && m.force != Vec3::zeros();
+        let carried =
+            |m: &&ContactMemory| m.key.slot >= FIRST_POINT && !m.key.is_between() && m.force != Vec3::zeros();
         for kept in memory.iter().filter(carried) {
             let (nodes, weights) = (kept.geometry.nodes[0], kept.geometry.weights[0]);
             let s = nodes.map(|n| surface.index_of_node[n as usize] as usize);

@@ -3,6 +3,7 @@
 //! Architecture invariant: the only room that names parry's queries, and it knows no rapier sets:
 //! `coupling` fills the [`Obstacle`]s.
 
+mod between;
 mod candidates;
 pub(crate) mod cone;
 mod detection;
@@ -10,9 +11,12 @@ mod obstacle;
 mod rim_rows;
 mod row;
 mod surface_point;
+mod surface_tree;
 mod triangle_rows;
 
+pub(crate) use between::{BetweenDetector, SoftPair, SoftSurface};
 pub(crate) use candidates::Candidates;
-pub(crate) use detection::{Detector, Pair};
+pub(crate) use detection::{Detector, Pair, STATIC_MARGIN};
 pub(crate) use obstacle::{Obstacle, PartnerId};
 pub(crate) use row::{Law, Row, Side};
+pub(crate) use surface_tree::SurfaceTree;

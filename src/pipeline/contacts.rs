@@ -22,6 +22,23 @@ pub struct DeformableContact {
     pub gap: f64,
 }
 
+/// A point where two deformable bodies touched in the last step, or one touched itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeformablePairContact {
+    /// The first body.
+    pub body1: DeformableBodyHandle,
+    /// The second body; the same one if it touches itself.
+    pub body2: DeformableBodyHandle,
+    /// Point on the first body at the end of the step \[m\].
+    pub point: Vector,
+    /// Unit normal, from the second body to the first.
+    pub normal: Vector,
+    /// Force on the first body \[N\]; the second got the opposite.
+    pub force: Vector,
+    /// Distance along the normal at the end of the step \[m\]; negative is penetration.
+    pub gap: f64,
+}
+
 /// A contact between two rigid bodies that the last step solved, because one of them is touched by a
 /// deformable body, or holds one that is. What rapier's own contact then shows is its remainder.
 #[derive(Clone, Copy, Debug, PartialEq)]

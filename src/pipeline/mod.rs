@@ -1,6 +1,7 @@
 //! The step, told as a list of verbs, and the world that owns it.
 
 mod contacts;
+mod encounters;
 mod grouping;
 mod parameters;
 #[allow(clippy::module_inception)]
@@ -11,7 +12,9 @@ mod threads;
 mod work;
 mod world;
 
-pub use contacts::{DeformableContact, JointForce, JointRole, RigidContact, SolvedJoint};
+pub use contacts::{
+    DeformableContact, DeformablePairContact, JointForce, JointRole, RigidContact, SolvedJoint,
+};
 pub use parameters::{DeformableCounters, DeformableParameters};
 pub use pipeline::DeformablePipeline;
 pub use world::DeformableWorld;

@@ -1,14 +1,15 @@
 //! The step.
 //!
 //! ```text
-//! read_obstacles → wake → predict → detect → tie → close → prepare_factors → form_islands → solve → advance
-//! → write reactions → (rapier steps) → after_step
+//! read_obstacles → wake → predict → detect → meet → tie → close → prepare_factors → form_islands → solve →
+//! advance → fall_asleep → write reactions → (rapier steps) → after_step
 //! ```
 
-use super::contacts::{DeformableContact, JointForce, RigidContact};
+use super::contacts::{DeformableContact, DeformablePairContact, JointForce, RigidContact};
+use super::encounters::Encounters;
 use super::grouping::Grouping;
 use super::parameters::{DeformableCounters, DeformableParameters};
-use super::readout::{add_attachment_forces, list_closure, list_contacts};
+use super::readout::{add_attachment_forces, list_closure, list_contacts, list_pair_contacts};
 use super::sleeping::Sleeping;
 use super::threads::for_each;
 use super::work::{BodyWork, IslandWork};
@@ -39,10 +40,13 @@ pub struct DeformablePipeline {
     closure: Closure,
     sleeping: Sleeping,
     slept: Vec<DeformableBodyHandle>,
+    encounters: Encounters,
+    /// Rows of attachments and of contacts between deformables.
     ties: Vec<Row>,
     reaction_list: Vec<Reaction>,
     reactions: Reactions,
     contacts: Vec<DeformableContact>,
+    pair_contacts: Vec<DeformablePairContact>,
     rigid_contacts: Vec<RigidContact>,
     joint_forces: Vec<JointForce>,
     counters: DeformableCounters,
@@ -71,6 +75,7 @@ impl DeformablePipeline {
         let (gravity, dt) = (parts.gravity, parts.dt);
         if !(dt.is_finite() && dt > 0.0 && gravity.is_finite()) {
             self.contacts.clear();
+            self.pair_contacts.clear();
             self.counters.skipped = true;
             return;
         }
@@ -80,9 +85,12 @@ impl DeformablePipeline {
         self.read_obstacles(sets, gravity, h);
         self.wake(deformables, sets, gravity, h);
         self.predict(deformables, gravity, h);
+        self.detect(deformables, sets, 0);
+        self.meet(deformables, sets, gravity, h);
         // What touches a sleeping body goes on to do so.
-        self.contacts.retain(|c| deformables.get(c.body).is_some_and(DeformableBody::is_sleeping));
-        self.detect(deformables, sets);
+        let sleeps = |body| deformables.get(body).is_some_and(DeformableBody::is_sleeping);
+        self.contacts.retain(|c| sleeps(c.body));
+        self.pair_contacts.retain(|c| sleeps(c.body1) && sleeps(c.body2));
         self.tie(deformables, sets, gravity, h);
         self.close(sets, gravity, h, parameters.closure_bodies);
         self.counters.detection_time = clock.lap();
@@ -122,6 +130,12 @@ impl DeformablePipeline {
     /// Contacts of the last step; of sleeping bodies those with which they fell asleep.
     pub fn contacts(&self) -> &[DeformableContact] {
         &self.contacts
+    }
+
+    /// Contacts between deformable bodies, and of bodies with themselves; of sleeping bodies those with which
+    /// they fell asleep.
+    pub fn pair_contacts(&self) -> &[DeformablePairContact] {
+        &self.pair_contacts
     }
 
     /// Contacts between rigid bodies that the last step solved.
@@ -166,27 +180,54 @@ impl DeformablePipeline {
                 self.counters.sleeping += 1;
                 continue;
             }
-            let work = self.idle.remove(&handle);
-            let mut work = work.unwrap_or_else(|| BodyWork::new(handle));
-            work.index = self.works.len();
-            self.works.push(work);
+            self.take_up(handle);
         }
-        // What is left belongs to bodies that were removed or disabled.
-        self.idle.clear();
         let (set, gravity) = (&*deformables, from_real(gravity));
         for_each(&mut self.works, |work| work.predict(&set[work.handle], h, &gravity));
-        self.counters.bodies = self.works.len();
     }
 
-    fn detect(&mut self, deformables: &DeformableBodySet, sets: RapierSets<'_>) {
+    fn take_up(&mut self, handle: DeformableBodyHandle) {
+        let work = self.idle.remove(&handle);
+        let mut work = work.unwrap_or_else(|| BodyWork::new(handle));
+        work.index = self.works.len();
+        self.works.push(work);
+    }
+
+    /// Finds the contacts of the bodies from place `first` on with rigid ones.
+    fn detect(&mut self, deformables: &DeformableBodySet, sets: RapierSets<'_>, first: usize) {
         let (scene, candidates) = (&self.scene, &self.candidates);
-        for_each(&mut self.works, |work| {
+        for_each(&mut self.works[first..], |work| {
             let body = &deformables[work.handle];
             work.detect(body, scene, candidates, sets);
             work.look_ahead(body, scene, candidates);
         });
-        self.counters.pairs = self.works.iter().map(|w| w.pairs).sum();
-        self.counters.contacts = self.works.iter().map(|w| w.rows.len()).sum();
+    }
+
+    /// Finds contacts between deformables; those that sleep and are touched wake, until there are no more.
+    fn meet(&mut self, deformables: &mut DeformableBodySet, sets: RapierSets<'_>, gravity: Vector, h: f64) {
+        loop {
+            self.encounters.find(&mut self.works, deformables);
+            if self.encounters.woken.is_empty() {
+                break;
+            }
+            let first = self.works.len();
+            for handle in std::mem::take(&mut self.encounters.woken) {
+                deformables[handle].wake_up();
+                self.take_up(handle);
+                self.counters.sleeping -= 1;
+            }
+            let (set, gravity) = (&*deformables, from_real(gravity));
+            for_each(&mut self.works[first..], |work| work.predict(&set[work.handle], h, &gravity));
+            self.detect(deformables, sets, first);
+        }
+        // What is left belongs to bodies that sleep, were removed or disabled.
+        self.idle.clear();
+        self.ties.clear();
+        self.encounters.take_rows(&self.works, deformables, &mut self.ties);
+        self.counters.bodies = self.works.len();
+        self.counters.pairs =
+            self.encounters.pair_count() + self.works.iter().map(|w| w.pairs).sum::<usize>();
+        self.counters.contacts = self.ties.len() + self.works.iter().map(|w| w.rows.len()).sum::<usize>();
     }
 
     fn prepare_factors(&mut self, deformables: &mut DeformableBodySet, h: f64, column_budget: usize) {
@@ -219,14 +260,13 @@ impl DeformablePipeline {
 
     /// Rows of the attachments.
     fn tie(&mut self, deformables: &DeformableBodySet, sets: RapierSets<'_>, gravity: Vector, h: f64) {
-        self.ties.clear();
         self.works.iter_mut().for_each(|work| work.tied.clear());
         let works = &self.works;
         let index_of = |handle: DeformableBodyHandle| works.iter().position(|w| w.handle == handle);
         tie_rows(deformables, &mut self.scene, sets, gravity, h, index_of, &mut self.ties);
         for side in self.ties.iter().flat_map(|row| &row.sides) {
-            if let Side::Soft { body, nodes, .. } = side {
-                self.works[*body].tied.push(nodes[0]);
+            if let Side::Soft { body, .. } = side {
+                self.works[*body].tied.extend(side.soft_nodes().map(|(node, _)| node as u32));
             }
         }
     }
@@ -282,6 +322,7 @@ impl DeformablePipeline {
                 contacts.add_reactions(&self.scene.partners, h, &mut self.reaction_list);
                 let handle_of = |local: usize| self.works[work.members[local]].handle;
                 list_contacts(work, &self.scene, handle_of, &mut self.contacts);
+                list_pair_contacts(work, handle_of, &mut self.pair_contacts);
                 add_attachment_forces(work, deformables);
                 list_closure(work, &self.closure, &mut self.rigid_contacts, &mut self.joint_forces);
             }
@@ -290,7 +331,8 @@ impl DeformablePipeline {
             }
         }
         deformables.attachments_mut().for_each(DeformableAttachment::end_step);
-        self.counters.active_contacts = self.contacts.iter().filter(|c| c.force != Vector::ZERO).count();
+        let forces = self.contacts.iter().map(|c| c.force).chain(self.pair_contacts.iter().map(|c| c.force));
+        self.counters.active_contacts = forces.filter(|force| *force != Vector::ZERO).count();
         self.idle.extend(self.works.drain(..).map(|work| (work.handle, work)));
     }
 }

@@ -1,6 +1,8 @@
 //! What users can read of a step, gathered from the islands.
 
-use super::contacts::{DeformableContact, JointForce, JointRole, RigidContact, SolvedJoint};
+use super::contacts::{
+    DeformableContact, DeformablePairContact, JointForce, JointRole, RigidContact, SolvedJoint,
+};
 use super::work::IslandWork;
 use crate::body::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet};
 use crate::contact::Side;
@@ -72,6 +74,27 @@ pub(super) fn list_contacts(
             collider: scene.collider_of(row.key.obstacle),
             point: to_real(point),
             normal: to_real(normal),
+            force: to_real(&system.force(i)),
+            gap: system.final_gap(i),
+        });
+    }
+}
+
+/// Lists the contacts between the bodies of an island.
+pub(super) fn list_pair_contacts(
+    work: &IslandWork,
+    handle_of: impl Fn(usize) -> DeformableBodyHandle,
+    contacts: &mut Vec<DeformablePairContact>,
+) {
+    let system = &work.island.contacts;
+    for (i, row) in system.rows.iter().enumerate().filter(|(_, row)| row.key.is_between()) {
+        let [Side::Soft { body: first, .. }, Side::Soft { body: second, .. }] = row.sides else { continue };
+        let point = row.sides[0].interpolate(&work.island.bodies[first].current.x);
+        contacts.push(DeformablePairContact {
+            body1: handle_of(first),
+            body2: handle_of(second),
+            point: to_real(&point),
+            normal: to_real(&row.frame[0]),
             force: to_real(&system.force(i)),
             gap: system.final_gap(i),
         });

@@ -31,8 +31,9 @@ impl Sleeping {
         self.wake_listed(deformables);
     }
 
-    /// Wakes bodies that are tied to one that is awake.
-    fn wake_tied(&mut self, deformables: &mut DeformableBodySet) {
+    /// Wakes bodies that are tied to one that is awake, or fell asleep touching one that is not asleep any
+    /// more.
+    fn wake_together(&mut self, deformables: &mut DeformableBodySet) {
         loop {
             self.wake.clear();
             for (_, attachment) in deformables.attachments().filter(|(_, a)| !a.is_broken()) {
@@ -40,6 +41,13 @@ impl Sleeping {
                 let (Some(a), Some(b)) = (deformables.get(one), deformables.get(other)) else { continue };
                 if a.is_enabled() && b.is_enabled() && a.is_sleeping() != b.is_sleeping() {
                     self.wake.push(if a.is_sleeping() { one } else { other });
+                }
+            }
+            for (handle, body) in deformables.iter() {
+                let Some(around) = &body.state.sleep.surroundings else { continue };
+                let sleeps = |mate| deformables.get(mate).is_some_and(|b| b.is_enabled() && b.is_sleeping());
+                if !around.mates.iter().all(|mate| sleeps(*mate)) {
+                    self.wake.push(handle);
                 }
             }
             if self.wake.is_empty() {
@@ -58,7 +66,7 @@ impl Sleeping {
     }
 
     /// Wakes whoever has a reason to: a changed attachment, anything around it that is not as it was when
-    /// it fell asleep, a tie to a body that is awake.
+    /// it fell asleep, a tie to a body that is awake, a touching body that woke or went.
     pub fn wake(
         &mut self,
         deformables: &mut DeformableBodySet,
@@ -71,11 +79,12 @@ impl Sleeping {
         self.wake_attached(deformables, sets);
         for (_, body) in deformables.iter_mut().filter(|(_, body)| body.is_enabled() && body.is_sleeping()) {
             self.look_around(body, scene, candidates, gravity, dt);
-            if body.state.sleep.surroundings.as_ref() != Some(&self.now) {
+            let before = body.state.sleep.surroundings.as_ref();
+            if !before.is_some_and(|before| before.is_around(&self.now)) {
                 body.wake_up();
             }
         }
-        self.wake_tied(deformables);
+        self.wake_together(deformables);
     }
 
     fn look_around(
@@ -128,6 +137,8 @@ impl Sleeping {
         for handle in handles {
             let Some(body) = deformables.get_mut(*handle) else { continue };
             self.look_around(body, scene, candidates, gravity, dt);
+            self.now.mates.clear();
+            self.now.mates.extend(handles.iter().copied().filter(|mate| mate != handle));
             body.fall_asleep(self.now.clone());
         }
     }

@@ -1,10 +1,11 @@
 //! What the pipeline keeps per body from step to step: memory only, nothing that results depend on.
 
 use crate::body::{ContactMemory, DeformableBody, DeformableBodyHandle, DeformableState, is_number};
-use crate::contact::{Candidates, Detector, Pair, Row, Side};
+use crate::contact::{Candidates, Detector, Pair, Row, STATIC_MARGIN, Side, SoftSurface, SurfaceTree};
 use crate::coupling::{RapierScene, RapierSets, combined};
 use crate::math::Vec3;
 use crate::solver::{BodyProblem, FactorId, Island};
+use parry3d::bounding_volume::Aabb;
 
 /// One body within a step.
 pub(super) struct BodyWork {
@@ -20,8 +21,13 @@ pub(super) struct BodyWork {
     /// Surface nodes in the order in which they are expected to touch.
     pub ahead: Vec<u32>,
     distances: Vec<(f32, u32)>,
-    /// Nodes that attachments act on.
+    /// Nodes that attachments and contacts with other deformables act on.
     pub tied: Vec<u32>,
+    /// Box around all that the body may touch over the step.
+    pub extent: Aabb,
+    /// Other deformables are near, or the body may touch itself.
+    pub in_company: bool,
+    tree: SurfaceTree,
 }
 
 /// How far a body that touches nothing looks ahead \[s\].
@@ -40,7 +46,51 @@ impl BodyWork {
             ahead: Vec::new(),
             distances: Vec::new(),
             tied: Vec::new(),
+            extent: Aabb::new_invalid(),
+            in_company: false,
+            tree: SurfaceTree::default(),
         }
+    }
+
+    /// Distance within which a body looks for contacts even without motion \[m\].
+    pub fn margin(&self, body: &DeformableBody) -> f32 {
+        (STATIC_MARGIN * body.model.surface.mean_edge) as f32
+    }
+
+    /// Takes a sleeping body in as an obstacle.
+    pub fn survey(&mut self, body: &DeformableBody) {
+        let (model, x) = (&body.model, &body.state.x);
+        self.detector.begin(model, x, x);
+        self.extent = self.detector.aabb(model, x);
+    }
+
+    /// Brings the tree over the surface up to date, if it is wanted.
+    pub fn grow_tree(&mut self, body: &DeformableBody) {
+        if self.in_company {
+            let target = self.problem.as_ref().map_or(&body.state.x, |problem| &problem.target);
+            self.tree.update(&body.model, &body.state.x, target, self.margin(body).into());
+        }
+    }
+
+    /// The surface over the step, of the body at `place` of the step's list.
+    pub fn surface<'a>(&'a self, place: usize, body: &'a DeformableBody) -> SoftSurface<'a> {
+        let (slot, generation) = self.handle.into_raw_parts();
+        SoftSurface {
+            body: place,
+            key: u64::from(generation) << 32 | u64::from(slot),
+            model: &body.model,
+            x: &body.state.x,
+            target: self.problem.as_ref().map_or(&body.state.x, |problem| &problem.target),
+            normals: &self.detector.normals,
+            reach: &self.detector.reach,
+            tree: &self.tree,
+        }
+    }
+
+    /// Whether all nodes of a side are pinned.
+    pub fn holds_all(&self, side: &Side) -> bool {
+        let pins = self.problem.as_ref().map(|problem| &problem.key.pins);
+        side.soft_nodes().all(|(node, _)| pins.is_some_and(|p| p.binary_search(&(node as u32)).is_ok()))
     }
 
     /// Takes the body in: inertial target, masses, damping.
@@ -78,7 +128,8 @@ impl BodyWork {
         let Some(problem) = &self.problem else { return };
         let (model, x) = (&problem.model, &problem.x_start);
         self.detector.begin(model, x, &problem.target);
-        candidates.near(&self.detector.aabb(model, x), &mut self.near);
+        self.extent = self.detector.aabb(model, x);
+        candidates.near(&self.extent, &mut self.near);
         for &o in &self.near {
             let collider = sets.colliders.get(scene.colliders[o as usize]);
             let Some((friction, restitution)) = collider.and_then(|c| combined(body, c)) else {
@@ -90,17 +141,18 @@ impl BodyWork {
             let memory = body.state.contacts_with(obstacle.key, obstacle.part);
             self.detector.detect(&pair, obstacle, model, x, memory, &mut self.rows);
         }
-        let pinned = |node: usize| problem.key.pins.binary_search(&(node as u32)).is_ok();
-        self.rows.retain_mut(|row| {
+        let mut rows = std::mem::take(&mut self.rows);
+        rows.retain_mut(|row| {
             // Between a pinned node and what does not yield there is nothing to solve for.
-            let held = row.sides[0].soft_nodes().all(|(n, _)| pinned(n));
+            let held = self.holds_all(&row.sides[0]);
             let yields = |side: &Side| side.partner().is_some_and(|id| scene.partners.yields(id));
             if let Some(memory) = body.state.contact(&row.key) {
                 row.recall(memory);
             }
             !held || row.sides.iter().any(yields)
         });
-        self.rows.sort_unstable_by_key(|row| row.key);
+        rows.sort_unstable_by_key(|row| row.key);
+        self.rows = rows;
     }
 
     /// Looks for obstacles that a body that touches nothing yet is about to meet, and lists its surface
@@ -167,7 +219,8 @@ impl IslandWork {
         }
     }
 
-    /// Takes over a row between members or partners of the island.
+    /// Takes over a row between members or partners of the island: of what holds the latter, of
+    /// attachments, of contacts between deformables.
     pub fn take_in_link(&mut self, mut row: Row) {
         for side in &mut row.sides {
             if let Side::Soft { body, .. } = side {

@@ -1,6 +1,6 @@
 //! Deformable bodies beside a rapier `PhysicsWorld`.
 
-use super::contacts::{DeformableContact, RigidContact, SolvedJoint};
+use super::contacts::{DeformableContact, DeformablePairContact, RigidContact, SolvedJoint};
 use super::parameters::{DeformableCounters, DeformableParameters};
 use super::pipeline::DeformablePipeline;
 use crate::body::{DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet};
@@ -108,6 +108,21 @@ impl DeformableWorld {
     pub fn contact_force(&self, body: DeformableBodyHandle, collider: ColliderHandle) -> Vector {
         let pair = self.contacts_of(body).filter(|c| c.collider == collider);
         pair.map(|c| c.force).sum()
+    }
+
+    /// Contacts between deformable bodies in the last step, and of bodies with themselves.
+    pub fn pair_contacts(&self) -> &[DeformablePairContact] {
+        self.pipeline.pair_contacts()
+    }
+
+    /// Force \[N\] on the first body from the second in the last step.
+    pub fn pair_force(&self, first: DeformableBodyHandle, second: DeformableBodyHandle) -> Vector {
+        let forces = self.pair_contacts().iter().filter_map(|c| match (c.body1, c.body2) {
+            ends if ends == (first, second) => Some(c.force),
+            ends if ends == (second, first) => Some(-c.force),
+            _ => None,
+        });
+        forces.sum()
     }
 
     /// Contacts between rigid bodies that the last step solved: of those that deformables touch, or that

@@ -1,0 +1,313 @@
+//! Contacts between the surfaces of two deformable bodies, or of one with itself: nodes on triangles, and
+//! edges across edges.
+//!
+//! Two flat faces on one another touch everywhere at once. What carries are the nodes of the finer one, on
+//! the triangles of the other; where those do not reach, nodes of the other on triangles of the finer one, and
+//! rims across rims.
+
+use super::row::{Law, Row, Side};
+use super::surface_tree::SurfaceTree;
+use super::triangle_rows::barycentric;
+use crate::body::{ContactKey, DeformableModel, SOFT_SLOT};
+use crate::math::Vec3;
+
+/// A body's surface in one step.
+#[derive(Clone, Copy)]
+pub(crate) struct SoftSurface<'a> {
+    /// Place in the step's list.
+    pub body: usize,
+    /// Names the body over several steps.
+    pub key: u64,
+    pub model: &'a DeformableModel,
+    /// Nodes at the start of the step, and where they would go without contact.
+    pub x: &'a [Vec3],
+    pub target: &'a [Vec3],
+    /// Per surface node: the body's normal, and how far the node may come.
+    pub normals: &'a [Vec3],
+    pub reach: &'a [f64],
+    pub tree: &'a SurfaceTree,
+}
+
+/// Two bodies that may touch: filters have been passed and coefficients combined.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SoftPair {
+    pub friction: f64,
+    pub restitution: f64,
+}
+
+/// Slots of the three kinds of rows: nodes of the first body, nodes of the second, edges.
+const FIRST_NODE: u32 = SOFT_SLOT;
+const SECOND_NODE: u32 = SOFT_SLOT + 1;
+const EDGES: u32 = SOFT_SLOT + 2;
+
+/// Cosine beyond which two surfaces face one another.
+const FACING: f64 = -0.1;
+/// Weights down to this still count as on a triangle.
+const BESIDE: f64 = -0.02;
+/// Cosine beyond which two rows push the same way.
+const PARALLEL: f64 = 0.9;
+/// Depth, in mean edges, beyond which an overlap is left to come apart by itself.
+const DEEPEST: f64 = 1.0;
+/// Nearer to the end of an edge than this part of it the node's own row serves.
+const AT_NODE: f64 = 1.0e-3;
+/// Sine of the angle below which edges count as parallel.
+const CROSSING: f64 = 0.1;
+
+/// Finds contacts between deformables; holds the memory it needs between calls.
+#[derive(Default)]
+pub(crate) struct BetweenDetector {
+    /// Surface nodes of one body and triangles of the other.
+    on_triangles: [Vec<(u32, u32)>; 2],
+    edges: Vec<(u32, u32)>,
+    /// Per surface node: the normal of its row, towards its own body.
+    held: [Vec<Option<Vec3>>; 2],
+}
+
+/// A node on a triangle.
+#[derive(Clone, Copy)]
+struct Touch {
+    triangle: usize,
+    weights: [f64; 3],
+    /// Outward of the triangle.
+    normal: Vec3,
+    gap: f64,
+}
+
+impl BetweenDetector {
+    /// Appends the contacts of two bodies to `rows`: of the first as side 0, of the second as side 1.
+    pub fn detect(&mut self, pair: &SoftPair, surfaces: [&SoftSurface<'_>; 2], rows: &mut Vec<Row>) {
+        let [a, b] = surfaces;
+        let itself = a.key == b.key;
+        self.collect(surfaces, itself);
+        for (held, surface) in self.held.iter_mut().zip(surfaces) {
+            held.clear();
+            held.resize(surface.model.surface.nodes.len(), None);
+        }
+        let first = rows.len();
+        let finer = usize::from(b.model.surface.mean_edge < a.model.surface.mean_edge);
+        for side in [finer, 1 - finer] {
+            // One's own surface was listed on both sides alike.
+            if !(itself && side != finer) {
+                self.touch(pair, surfaces, side, rows);
+            }
+        }
+        if itself {
+            self.held[1 - finer] = self.held[finer].clone();
+        }
+        self.cross(pair, surfaces, rows);
+        rows[first..].sort_unstable_by_key(|row| row.key);
+    }
+
+    /// Lists what is to be looked at closely.
+    fn collect(&mut self, [a, b]: [&SoftSurface<'_>; 2], itself: bool) {
+        self.on_triangles.iter_mut().for_each(Vec::clear);
+        self.edges.clear();
+        let [of_a, of_b] = &mut self.on_triangles;
+        let index = |s: &SoftSurface<'_>, n: u32| s.model.surface.index_of_node[n as usize];
+        for (ta, tb) in a.tree.pairs(b.tree) {
+            let (s, t) = (&a.model.surface, &b.model.surface);
+            of_a.extend(s.triangles[ta as usize].iter().map(|&n| (index(a, n), tb)));
+            if !itself {
+                of_b.extend(t.triangles[tb as usize].iter().map(|&n| (index(b, n), ta)));
+            }
+            let across = |ea: u32| t.triangle_edges[tb as usize].map(|eb| (ea, eb));
+            let crossing = s.triangle_edges[ta as usize].into_iter().flat_map(across);
+            self.edges.extend(crossing.filter(|(ea, eb)| !itself || ea < eb));
+        }
+        for list in [of_a, of_b, &mut self.edges] {
+            list.sort_unstable();
+            list.dedup();
+        }
+    }
+
+    /// Nodes of the body on `side` on triangles of the other.
+    fn touch(&mut self, pair: &SoftPair, surfaces: [&SoftSurface<'_>; 2], side: usize, rows: &mut Vec<Row>) {
+        let (own, other) = (surfaces[side], surfaces[1 - side]);
+        let itself = own.key == other.key;
+        let list = std::mem::take(&mut self.on_triangles[side]);
+        for near in list.chunk_by(|a, b| a.0 == b.0) {
+            let s = near[0].0 as usize;
+            let mut best: Option<Touch> = None;
+            for &(_, t) in near {
+                if itself && are_neighbours(own, s, t as usize) {
+                    continue;
+                }
+                let Some(touch) = on_triangle(own, s, other, t as usize) else { continue };
+                // The finer body's rows hold the triangle already.
+                let corners = other.model.surface.triangles[touch.triangle];
+                let holds = |&n: &u32| {
+                    let index = other.model.surface.index_of_node[n as usize] as usize;
+                    self.held[1 - side][index].is_some_and(|held| held.dot(&touch.normal) < -PARALLEL)
+                };
+                if !itself && corners.iter().all(holds) {
+                    continue;
+                }
+                if best.is_none_or(|b| touch.gap.abs() < b.gap.abs()) {
+                    best = Some(touch);
+                }
+            }
+            let Some(touch) = best else { continue };
+            self.held[side][s] = Some(touch.normal);
+            let node = own.model.surface.nodes[s];
+            let own_side = Side::Soft { body: own.body, nodes: [node, 0, 0], weights: [1.0, 0.0, 0.0] };
+            let nodes = other.model.surface.triangles[touch.triangle];
+            let other_side = Side::Soft { body: other.body, nodes, weights: touch.weights };
+            let (sides, normal, slot) = match side {
+                0 => ([own_side, other_side], touch.normal, FIRST_NODE),
+                _ => ([other_side, own_side], -touch.normal, SECOND_NODE),
+            };
+            let key = ContactKey { obstacle: surfaces[1].key, part: 0, feature: node, slot };
+            rows.push(pair.row(sides, normal, touch.gap, key));
+        }
+        self.on_triangles[side] = list;
+    }
+
+    /// Edges across edges.
+    fn cross(&mut self, pair: &SoftPair, surfaces: [&SoftSurface<'_>; 2], rows: &mut Vec<Row>) {
+        let [a, b] = surfaces;
+        let itself = a.key == b.key;
+        for &(ea, eb) in &self.edges {
+            let nodes = [a.model.surface.edges[ea as usize], b.model.surface.edges[eb as usize]];
+            if itself && nodes[0].iter().any(|&n| nodes[1].iter().any(|&m| near_in_mesh(a.model, n, m))) {
+                continue;
+            }
+            let Some(crossing) = crossing(a, ea as usize, b, eb as usize) else { continue };
+            let holds = |side: usize| {
+                nodes[side].iter().all(|&n| {
+                    let index = surfaces[side].model.surface.index_of_node[n as usize] as usize;
+                    self.held[side][index].is_some_and(|held| held.dot(&crossing.normal).abs() > PARALLEL)
+                })
+            };
+            if holds(0) || holds(1) {
+                continue;
+            }
+            let soft = |k: usize, body: usize| {
+                let [i, j] = nodes[k];
+                let t = crossing.places[k];
+                Side::Soft { body, nodes: [i, j, 0], weights: [1.0 - t, t, 0.0] }
+            };
+            let key = ContactKey { obstacle: b.key, part: eb, feature: ea, slot: EDGES };
+            rows.push(pair.row([soft(0, a.body), soft(1, b.body)], crossing.normal, crossing.gap, key));
+        }
+    }
+}
+
+impl SoftPair {
+    fn row(&self, sides: [Side; 2], normal: Vec3, gap: f64, key: ContactKey) -> Row {
+        let mut row = Row::new(sides, normal, gap, key);
+        row.law = Law::Contact { friction: self.friction };
+        row.restitution = self.restitution;
+        row
+    }
+}
+
+/// Surface node `s` of one body on triangle `t` of another, where it comes to lie within the step.
+fn on_triangle(own: &SoftSurface<'_>, s: usize, other: &SoftSurface<'_>, t: usize) -> Option<Touch> {
+    let node = own.model.surface.nodes[s] as usize;
+    let nodes = other.model.surface.triangles[t].map(|n| n as usize);
+    let corners = nodes.map(|n| other.x[n]);
+    let [a, b, c] = corners;
+    let normal = (b - a).cross(&(c - a)).try_normalize(0.0)?;
+    if normal.dot(&own.normals[s]) > FACING {
+        return None;
+    }
+    let x = own.x[node];
+    let height = normal.dot(&(x - a));
+    let index = |n: usize| other.model.surface.index_of_node[n] as usize;
+    let reach = own.reach[s] + nodes.iter().fold(0.0, |r: f64, &n| r.max(other.reach[index(n)]));
+    if !(height < reach && height > -DEEPEST * other.model.surface.mean_edge) {
+        return None;
+    }
+    // Where the two are when they meet.
+    let way = own.target[node] - x;
+    let ways = nodes.map(|n| other.target[n] - other.x[n]);
+    let closing = normal.dot(&((ways[0] + ways[1] + ways[2]) / 3.0 - way));
+    let when = if height > 0.0 && closing > 0.0 { (height / closing).min(1.0) } else { 0.0 };
+    let met = [0, 1, 2].map(|k| corners[k] + ways[k] * when);
+    let weights = barycentric(&met, &(x + way * when))?;
+    if weights.iter().any(|w| *w < BESIDE) {
+        return None;
+    }
+    let weights = weights.map(|w| w.max(0.0));
+    let sum: f64 = weights.iter().sum();
+    let weights = weights.map(|w| w / sum);
+    let foot = a * weights[0] + b * weights[1] + c * weights[2];
+    let gap = normal.dot(&(x - foot));
+    Some(Touch { triangle: t, weights, normal, gap })
+}
+
+/// Two edges across one another.
+struct Crossing {
+    /// Places on the two edges, 0 at their first nodes.
+    places: [f64; 2],
+    /// From the second body to the first.
+    normal: Vec3,
+    gap: f64,
+}
+
+fn crossing(a: &SoftSurface<'_>, ea: usize, b: &SoftSurface<'_>, eb: usize) -> Option<Crossing> {
+    let ends = |s: &SoftSurface<'_>, e: usize| s.model.surface.edges[e].map(|n| n as usize);
+    let ([i, j], [k, l]) = (ends(a, ea), ends(b, eb));
+    let (p, u) = (a.x[i], a.x[j] - a.x[i]);
+    let (q, v) = (b.x[k], b.x[l] - b.x[k]);
+    let across = u.cross(&v);
+    let length = across.norm();
+    if !(length > CROSSING * u.norm() * v.norm()) {
+        return None;
+    }
+    let normal = across / length;
+    let [outward_a, outward_b] = [edge_normals(a, ea), edge_normals(b, eb)];
+    // From b to a: into a, out of b.
+    let towards =
+        |n: &Vec3| outward_b[0].dot(n) + outward_b[1].dot(n) - outward_a[0].dot(n) - outward_a[1].dot(n);
+    let normal = if towards(&normal) < 0.0 { -normal } else { normal };
+    let faces = |n: &Vec3, outward: &[Vec3; 2]| {
+        let both = outward.iter().all(|o| o.dot(n) > FACING);
+        both && (outward[0] + outward[1]).dot(n) > 0.5 * (outward[0] + outward[1]).norm()
+    };
+    if !faces(&-normal, &outward_a) || !faces(&normal, &outward_b) {
+        return None;
+    }
+    let height = normal.dot(&(p - q));
+    let reach_of = |s: &SoftSurface<'_>, ends: [usize; 2]| {
+        ends.map(|n| s.reach[s.model.surface.index_of_node[n] as usize]).into_iter().fold(0.0, f64::max)
+    };
+    let reach = reach_of(a, [i, j]) + reach_of(b, [k, l]);
+    let deepest = DEEPEST * a.model.surface.mean_edge.min(b.model.surface.mean_edge);
+    if !(height < reach && height > -deepest) {
+        return None;
+    }
+    let move_of = |s: &SoftSurface<'_>, ends: [usize; 2]| {
+        (s.target[ends[0]] - s.x[ends[0]] + s.target[ends[1]] - s.x[ends[1]]) * 0.5
+    };
+    let way = move_of(a, [i, j]) - move_of(b, [k, l]);
+    let closing = -normal.dot(&way);
+    let when = if height > 0.0 && closing > 0.0 { (height / closing).min(1.0) } else { 0.0 };
+    // In the plane of both: p + s u = q + t v.
+    let w = q - p - way * when;
+    let squared = length * length;
+    let s = w.cross(&v).dot(&across) / squared;
+    let t = w.cross(&u).dot(&across) / squared;
+    let inside = |t: f64| t > AT_NODE && t < 1.0 - AT_NODE;
+    (inside(s) && inside(t)).then_some(Crossing { places: [s, t], normal, gap: height })
+}
+
+/// Outward normals of the two triangles on an edge.
+fn edge_normals(s: &SoftSurface<'_>, edge: usize) -> [Vec3; 2] {
+    let surface = &s.model.surface;
+    surface.edge_triangles[edge].map(|t| {
+        let [a, b, c] = surface.triangles[t as usize].map(|n| s.x[n as usize]);
+        (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default()
+    })
+}
+
+/// Whether a surface node and a triangle of the same body are too near in the mesh to touch.
+fn are_neighbours(s: &SoftSurface<'_>, node: usize, triangle: usize) -> bool {
+    let node = s.model.surface.nodes[node];
+    s.model.surface.triangles[triangle].iter().any(|&n| near_in_mesh(s.model, node, n))
+}
+
+/// Whether two nodes are the same or share a tetrahedron.
+fn near_in_mesh(model: &DeformableModel, a: u32, b: u32) -> bool {
+    a == b || model.adjacency[a as usize].binary_search(&b).is_ok()
+}

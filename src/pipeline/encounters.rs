@@ -1,0 +1,165 @@
+//! Deformable bodies that come near one another, and the contacts between them.
+
+use super::threads::for_each;
+use super::work::BodyWork;
+use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet};
+use crate::contact::{BetweenDetector, Row, Side, SoftPair};
+use parry3d::bounding_volume::{Aabb, BoundingVolume};
+use rapier3d::dynamics::CoefficientCombineRule;
+
+/// Pairs of bodies and memory for finding them.
+#[derive(Default)]
+pub(super) struct Encounters {
+    /// Boxes of the bodies with their places: those that are stepped first, then those that sleep.
+    boxes: Vec<(Aabb, usize)>,
+    /// Bodies that sleep beside others, as obstacles until they are woken.
+    dormant: Vec<BodyWork>,
+    pairs: Vec<Encounter>,
+    /// Bodies tied to one another, which do not collide.
+    tied: Vec<[DeformableBodyHandle; 2]>,
+    /// Sleeping bodies that were touched.
+    pub woken: Vec<DeformableBodyHandle>,
+}
+
+/// Two bodies, or one with itself.
+struct Encounter {
+    /// Places, the older handle first.
+    ends: [usize; 2],
+    pair: SoftPair,
+    detector: BetweenDetector,
+    rows: Vec<Row>,
+}
+
+impl Encounters {
+    /// Finds the contacts between the bodies being stepped and with those that sleep; the latter are listed
+    /// in `woken`.
+    pub fn find(&mut self, works: &mut [BodyWork], deformables: &DeformableBodySet) {
+        self.woken.clear();
+        self.take_boxes(works, deformables);
+        self.pair_up(works, deformables);
+        for work in works.iter_mut() {
+            work.in_company = false;
+        }
+        for end in self.pairs.iter().flat_map(|pair| pair.ends) {
+            match works.get_mut(end) {
+                Some(work) => work.in_company = true,
+                None => self.dormant[end - works.len()].in_company = true,
+            }
+        }
+        for_each(works, |work| work.grow_tree(&deformables[work.handle]));
+        for_each(&mut self.dormant, |work| work.grow_tree(&deformables[work.handle]));
+        let (works, dormant) = (&*works, &self.dormant);
+        let surface = |place: usize| {
+            let work = works.get(place).unwrap_or_else(|| &dormant[place - works.len()]);
+            work.surface(place, &deformables[work.handle])
+        };
+        for_each(&mut self.pairs, |encounter| {
+            let [a, b] = encounter.ends.map(surface);
+            encounter.rows.clear();
+            encounter.detector.detect(&encounter.pair, [&a, &b], &mut encounter.rows);
+        });
+        for encounter in self.pairs.iter().filter(|pair| !pair.rows.is_empty()) {
+            let sleeping = encounter.ends.iter().filter_map(|end| end.checked_sub(works.len()));
+            self.woken.extend(sleeping.map(|place| dormant[place].handle));
+        }
+        self.woken.sort_unstable();
+        self.woken.dedup();
+    }
+
+    /// Appends the contacts that were found last, with what bodies remember of them.
+    pub fn take_rows(&self, works: &[BodyWork], deformables: &DeformableBodySet, rows: &mut Vec<Row>) {
+        for encounter in &self.pairs {
+            let body = &deformables[works[encounter.ends[0]].handle];
+            let held = |side: &Side| match side {
+                Side::Soft { body, .. } => works[*body].holds_all(side),
+                Side::Partner { .. } | Side::Turn { .. } => true,
+            };
+            let free = encounter.rows.iter().filter(|row| !row.sides.iter().all(held));
+            rows.extend(free.map(|row| {
+                let mut row = row.clone();
+                if let Some(memory) = body.state.contact(&row.key) {
+                    row.recall(memory);
+                }
+                row
+            }));
+        }
+    }
+
+    /// Number of pairs looked at closely.
+    pub fn pair_count(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// Boxes of all bodies that are stepped, and of those that sleep beside them.
+    fn take_boxes(&mut self, works: &[BodyWork], deformables: &DeformableBodySet) {
+        self.boxes.clear();
+        self.boxes.extend(works.iter().enumerate().map(|(place, work)| (work.extent, place)));
+        self.dormant.clear();
+        let Some(all) = self.boxes.iter().map(|(aabb, _)| *aabb).reduce(|a, b| a.merged(&b)) else { return };
+        for (handle, body) in deformables.iter().filter(|(_, b)| b.is_enabled() && b.is_sleeping()) {
+            let mut work = BodyWork::new(handle);
+            if body.aabb().loosened(work.margin(body)).intersects(&all) {
+                work.survey(body);
+                self.boxes.push((work.extent, works.len() + self.dormant.len()));
+                self.dormant.push(work);
+            }
+        }
+    }
+
+    /// Pairs of bodies whose boxes meet, by a sweep along x.
+    fn pair_up(&mut self, works: &[BodyWork], deformables: &DeformableBodySet) {
+        self.tied.clear();
+        for (_, attachment) in deformables.attachments().filter(|(_, a)| !a.is_broken()) {
+            if let [Some(one), Some(other)] = attachment.bodies() {
+                self.tied.push([one.min(other), one.max(other)]);
+            }
+        }
+        self.tied.sort_unstable();
+        self.boxes.sort_by(|a, b| a.0.mins.x.total_cmp(&b.0.mins.x).then(a.1.cmp(&b.1)));
+        let handle = |place: usize| match works.get(place) {
+            Some(work) => work.handle,
+            None => self.dormant[place - works.len()].handle,
+        };
+        let mut memory = std::mem::take(&mut self.pairs);
+        let mut pairs = Vec::with_capacity(memory.len());
+        let mut add = |ends: [usize; 2], pair: SoftPair| {
+            let old = memory.pop().map(|old| (old.detector, old.rows));
+            let (detector, rows) = old.unwrap_or_default();
+            pairs.push(Encounter { ends, pair, detector, rows });
+        };
+        for (i, (aabb, place)) in self.boxes.iter().enumerate() {
+            let own = &deformables[handle(*place)];
+            if own.self_contact() && *place < works.len() {
+                add([*place; 2], pair_of(own, own));
+            }
+            let near = self.boxes[i + 1..].iter().take_while(|(other, _)| other.mins.x <= aabb.maxs.x);
+            for (_, other) in near.filter(|(other, _)| other.intersects(aabb)) {
+                let mut ends = [*place, *other];
+                if ends.iter().all(|end| *end >= works.len()) {
+                    continue;
+                }
+                ends.sort_by_key(|end| handle(*end));
+                let handles = ends.map(handle);
+                let [a, b] = handles.map(|h| &deformables[h]);
+                let collide = a.collision_groups().test(b.collision_groups());
+                if collide && self.tied.binary_search(&handles).is_err() {
+                    add(ends, pair_of(a, b));
+                }
+            }
+        }
+        pairs.sort_by_key(|pair| pair.ends.map(handle));
+        self.pairs = pairs;
+    }
+}
+
+/// Friction and restitution of two bodies by rapier's rules.
+fn pair_of(a: &DeformableBody, b: &DeformableBody) -> SoftPair {
+    let combine = |one: f64, other: f64, rule, other_rule| {
+        f64::from(CoefficientCombineRule::combine(one as f32, other as f32, rule, other_rule))
+    };
+    let (m, n) = (a.material(), b.material());
+    let friction = combine(m.friction, n.friction, a.friction_combine_rule(), b.friction_combine_rule());
+    let restitution =
+        combine(m.restitution, n.restitution, a.restitution_combine_rule(), b.restitution_combine_rule());
+    SoftPair { friction: friction.clamp(0.0, 1e4), restitution: restitution.clamp(0.0, 1.0) }
+}
