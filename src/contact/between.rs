@@ -4,11 +4,14 @@
 //! Two flat faces on one another touch everywhere at once. What carries are the nodes of the finer one, on
 //! the triangles of the other; where those do not reach, nodes of the other on triangles of the finer one, and
 //! rims across rims.
+//!
+//! What carried in the last step is looked at again, and given more room: on the ridge between two triangles
+//! each pushes the node onto the other, and with one of them at a time the two would take turns for ever.
 
 use super::row::{Law, Row, Side};
 use super::surface_tree::SurfaceTree;
 use super::triangle_rows::barycentric;
-use crate::body::{ContactKey, DeformableModel, SOFT_SLOT};
+use crate::body::{ContactKey, ContactMemory, DeformableModel, SOFT_SLOT};
 use crate::math::Vec3;
 
 /// A body's surface in one step.
@@ -42,8 +45,11 @@ const EDGES: u32 = SOFT_SLOT + 2;
 
 /// Cosine beyond which two surfaces face one another.
 const FACING: f64 = -0.1;
-/// Weights down to this still count as on a triangle.
-const BESIDE: f64 = -0.02;
+/// By how much weights and places on edges may miss, at first and where contact was.
+const BESIDE: f64 = 0.02;
+const STILL_BESIDE: f64 = 0.3;
+/// Cosine beyond which two triangles of one surface are one face.
+const COPLANAR: f64 = 0.9999;
 /// Cosine beyond which two rows push the same way.
 const PARALLEL: f64 = 0.9;
 /// Depth, in mean edges, beyond which an overlap is left to come apart by itself.
@@ -59,6 +65,9 @@ pub(crate) struct BetweenDetector {
     /// Surface nodes of one body and triangles of the other.
     on_triangles: [Vec<(u32, u32)>; 2],
     edges: Vec<(u32, u32)>,
+    /// Names of the contacts that carried in the last step, ascending.
+    carried: Vec<ContactKey>,
+    touches: Vec<Touch>,
     /// Per surface node: the normal of its row, towards its own body.
     held: [Vec<Option<Vec3>>; 2],
 }
@@ -71,12 +80,25 @@ struct Touch {
     /// Outward of the triangle.
     normal: Vec3,
     gap: f64,
+    /// By how much the weights miss the triangle.
+    miss: f64,
 }
 
 impl BetweenDetector {
     /// Appends the contacts of two bodies to `rows`: of the first as side 0, of the second as side 1.
-    pub fn detect(&mut self, pair: &SoftPair, surfaces: [&SoftSurface<'_>; 2], rows: &mut Vec<Row>) {
+    /// `memory` holds the contacts of the first in the last step.
+    pub fn detect(
+        &mut self,
+        pair: &SoftPair,
+        surfaces: [&SoftSurface<'_>; 2],
+        memory: &[ContactMemory],
+        rows: &mut Vec<Row>,
+    ) {
         let [a, b] = surfaces;
+        self.carried.clear();
+        let between = |m: &&ContactMemory| m.key.is_between() && m.key.obstacle == b.key;
+        let carried = memory.iter().filter(between).filter(|m| m.force != Vec3::zeros());
+        self.carried.extend(carried.map(|m| m.key));
         let itself = a.key == b.key;
         self.collect(surfaces, itself);
         for (held, surface) in self.held.iter_mut().zip(surfaces) {
@@ -125,41 +147,60 @@ impl BetweenDetector {
         let (own, other) = (surfaces[side], surfaces[1 - side]);
         let itself = own.key == other.key;
         let list = std::mem::take(&mut self.on_triangles[side]);
+        let mut touches = std::mem::take(&mut self.touches);
         for near in list.chunk_by(|a, b| a.0 == b.0) {
             let s = near[0].0 as usize;
+            let node = own.model.surface.nodes[s];
+            let slot = if side == 0 { FIRST_NODE } else { SECOND_NODE };
+            let key = |t: u32| ContactKey { obstacle: surfaces[1].key, part: t, feature: node, slot };
+            touches.clear();
+            // The nearest fresh one, and those of the last step.
             let mut best: Option<Touch> = None;
             for &(_, t) in near {
                 if itself && are_neighbours(own, s, t as usize) {
                     continue;
                 }
-                let Some(touch) = on_triangle(own, s, other, t as usize) else { continue };
-                // The finer body's rows hold the triangle already.
-                let corners = other.model.surface.triangles[touch.triangle];
-                let holds = |&n: &u32| {
-                    let index = other.model.surface.index_of_node[n as usize] as usize;
-                    self.held[1 - side][index].is_some_and(|held| held.dot(&touch.normal) < -PARALLEL)
-                };
-                if !itself && corners.iter().all(holds) {
+                let carried = self.carried.binary_search(&key(t)).is_ok();
+                let room = if carried { STILL_BESIDE } else { BESIDE };
+                let touch = on_triangle(own, s, other, t as usize, room);
+                let Some(touch) = touch.filter(|touch| itself || !self.is_held(touch, other, 1 - side))
+                else {
                     continue;
+                };
+                if carried {
+                    touches.push(touch);
                 }
-                if best.is_none_or(|b| touch.gap.abs() < b.gap.abs()) {
+                if touch.miss <= BESIDE && best.is_none_or(|b| touch.gap.abs() < b.gap.abs()) {
                     best = Some(touch);
                 }
             }
-            let Some(touch) = best else { continue };
-            self.held[side][s] = Some(touch.normal);
-            let node = own.model.surface.nodes[s];
-            let own_side = Side::Soft { body: own.body, nodes: [node, 0, 0], weights: [1.0, 0.0, 0.0] };
-            let nodes = other.model.surface.triangles[touch.triangle];
-            let other_side = Side::Soft { body: other.body, nodes, weights: touch.weights };
-            let (sides, normal, slot) = match side {
-                0 => ([own_side, other_side], touch.normal, FIRST_NODE),
-                _ => ([other_side, own_side], -touch.normal, SECOND_NODE),
-            };
-            let key = ContactKey { obstacle: surfaces[1].key, part: 0, feature: node, slot };
-            rows.push(pair.row(sides, normal, touch.gap, key));
+            if let Some(best) = best {
+                touches.retain(|t| t.triangle != best.triangle && t.normal.dot(&best.normal) < COPLANAR);
+                touches.push(best);
+            }
+            let Some(last) = touches.last() else { continue };
+            self.held[side][s] = Some(last.normal);
+            for touch in &touches {
+                let own_side = Side::Soft { body: own.body, nodes: [node, 0, 0], weights: [1.0, 0.0, 0.0] };
+                let nodes = other.model.surface.triangles[touch.triangle];
+                let other_side = Side::Soft { body: other.body, nodes, weights: touch.weights };
+                let (sides, normal) = match side {
+                    0 => ([own_side, other_side], touch.normal),
+                    _ => ([other_side, own_side], -touch.normal),
+                };
+                rows.push(pair.row(sides, normal, touch.gap, key(touch.triangle as u32)));
+            }
         }
+        self.touches = touches;
         self.on_triangles[side] = list;
+    }
+
+    /// Whether the nodes of a triangle have rows already that keep it from what touches it.
+    fn is_held(&self, touch: &Touch, surface: &SoftSurface<'_>, side: usize) -> bool {
+        surface.model.surface.triangles[touch.triangle].iter().all(|&n| {
+            let index = surface.model.surface.index_of_node[n as usize] as usize;
+            self.held[side][index].is_some_and(|held| held.dot(&touch.normal) < -PARALLEL)
+        })
     }
 
     /// Edges across edges.
@@ -171,7 +212,10 @@ impl BetweenDetector {
             if itself && nodes[0].iter().any(|&n| nodes[1].iter().any(|&m| near_in_mesh(a.model, n, m))) {
                 continue;
             }
-            let Some(crossing) = crossing(a, ea as usize, b, eb as usize) else { continue };
+            let key = ContactKey { obstacle: b.key, part: eb, feature: ea, slot: EDGES };
+            let carried = self.carried.binary_search(&key).is_ok();
+            let room = if carried { STILL_BESIDE } else { -AT_NODE };
+            let Some(crossing) = crossing(a, ea as usize, b, eb as usize, room) else { continue };
             let holds = |side: usize| {
                 nodes[side].iter().all(|&n| {
                     let index = surfaces[side].model.surface.index_of_node[n as usize] as usize;
@@ -186,7 +230,6 @@ impl BetweenDetector {
                 let t = crossing.places[k];
                 Side::Soft { body, nodes: [i, j, 0], weights: [1.0 - t, t, 0.0] }
             };
-            let key = ContactKey { obstacle: b.key, part: eb, feature: ea, slot: EDGES };
             rows.push(pair.row([soft(0, a.body), soft(1, b.body)], crossing.normal, crossing.gap, key));
         }
     }
@@ -201,8 +244,15 @@ impl SoftPair {
     }
 }
 
-/// Surface node `s` of one body on triangle `t` of another, where it comes to lie within the step.
-fn on_triangle(own: &SoftSurface<'_>, s: usize, other: &SoftSurface<'_>, t: usize) -> Option<Touch> {
+/// Surface node `s` of one body on triangle `t` of another, where it comes to lie within the step, or misses
+/// it by no more than `room`.
+fn on_triangle(
+    own: &SoftSurface<'_>,
+    s: usize,
+    other: &SoftSurface<'_>,
+    t: usize,
+    room: f64,
+) -> Option<Touch> {
     let node = own.model.surface.nodes[s] as usize;
     let nodes = other.model.surface.triangles[t].map(|n| n as usize);
     let corners = nodes.map(|n| other.x[n]);
@@ -225,7 +275,8 @@ fn on_triangle(own: &SoftSurface<'_>, s: usize, other: &SoftSurface<'_>, t: usiz
     let when = if height > 0.0 && closing > 0.0 { (height / closing).min(1.0) } else { 0.0 };
     let met = [0, 1, 2].map(|k| corners[k] + ways[k] * when);
     let weights = barycentric(&met, &(x + way * when))?;
-    if weights.iter().any(|w| *w < BESIDE) {
+    let miss = weights.iter().fold(0.0, |miss: f64, w| miss.max(-w));
+    if miss > room {
         return None;
     }
     let weights = weights.map(|w| w.max(0.0));
@@ -233,7 +284,7 @@ fn on_triangle(own: &SoftSurface<'_>, s: usize, other: &SoftSurface<'_>, t: usiz
     let weights = weights.map(|w| w / sum);
     let foot = a * weights[0] + b * weights[1] + c * weights[2];
     let gap = normal.dot(&(x - foot));
-    Some(Touch { triangle: t, weights, normal, gap })
+    Some(Touch { triangle: t, weights, normal, gap, miss })
 }
 
 /// Two edges across one another.
@@ -245,7 +296,9 @@ struct Crossing {
     gap: f64,
 }
 
-fn crossing(a: &SoftSurface<'_>, ea: usize, b: &SoftSurface<'_>, eb: usize) -> Option<Crossing> {
+/// Edges of two bodies that cross within the step, `room` being the part of an edge beyond its ends that
+/// counts too.
+fn crossing(a: &SoftSurface<'_>, ea: usize, b: &SoftSurface<'_>, eb: usize, room: f64) -> Option<Crossing> {
     let ends = |s: &SoftSurface<'_>, e: usize| s.model.surface.edges[e].map(|n| n as usize);
     let ([i, j], [k, l]) = (ends(a, ea), ends(b, eb));
     let (p, u) = (a.x[i], a.x[j] - a.x[i]);
@@ -288,7 +341,7 @@ fn crossing(a: &SoftSurface<'_>, ea: usize, b: &SoftSurface<'_>, eb: usize) -> O
     let squared = length * length;
     let s = w.cross(&v).dot(&across) / squared;
     let t = w.cross(&u).dot(&across) / squared;
-    let inside = |t: f64| t > AT_NODE && t < 1.0 - AT_NODE;
+    let inside = |t: f64| t > -room && t < 1.0 + room;
     (inside(s) && inside(t)).then_some(Crossing { places: [s, t], normal, gap: height })
 }
 

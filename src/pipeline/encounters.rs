@@ -49,14 +49,13 @@ impl Encounters {
         for_each(works, |work| work.grow_tree(&deformables[work.handle]));
         for_each(&mut self.dormant, |work| work.grow_tree(&deformables[work.handle]));
         let (works, dormant) = (&*works, &self.dormant);
-        let surface = |place: usize| {
-            let work = works.get(place).unwrap_or_else(|| &dormant[place - works.len()]);
-            work.surface(place, &deformables[work.handle])
-        };
+        let work = |place: usize| works.get(place).unwrap_or_else(|| &dormant[place - works.len()]);
+        let surface = |place: usize| work(place).surface(place, &deformables[work(place).handle]);
         for_each(&mut self.pairs, |encounter| {
             let [a, b] = encounter.ends.map(surface);
+            let memory = &deformables[work(encounter.ends[0]).handle].state.contacts;
             encounter.rows.clear();
-            encounter.detector.detect(&encounter.pair, [&a, &b], &mut encounter.rows);
+            encounter.detector.detect(&encounter.pair, [&a, &b], memory, &mut encounter.rows);
         });
         for encounter in self.pairs.iter().filter(|pair| !pair.rows.is_empty()) {
             let sleeping = encounter.ends.iter().filter_map(|end| end.checked_sub(works.len()));
