@@ -49,6 +49,7 @@ pub use body::{
     DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableModel, DeformableState,
     FactorPrecision, Frames, Pin, SolverSettings, SystemMatrix,
 };
+pub use contact::DeformableSurfacePoint;
 pub use coupling::PhysicsParts;
 pub use energy::Elasticity;
 pub use error::{DeformableBodyError, HandleError};
@@ -65,9 +66,9 @@ pub mod prelude {
         Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
         DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
         DeformableContact, DeformableCounters, DeformableMaterial, DeformableModel, DeformablePairContact,
-        DeformableParameters, DeformablePipeline, DeformableWorld, Elasticity, FactorPrecision, Frames,
-        JointForce, JointRole, PhysicsParts, RigidContact, SolvedJoint, SolverSettings, SystemMatrix,
-        TetMesh,
+        DeformableParameters, DeformablePipeline, DeformableSurfacePoint, DeformableWorld, Elasticity,
+        FactorPrecision, Frames, JointForce, JointRole, PhysicsParts, RigidContact, SolvedJoint,
+        SolverSettings, SystemMatrix, TetMesh,
     };
 }
 

@@ -32,7 +32,7 @@ pub(crate) struct SoftSurface<'a> {
 }
 
 /// Two bodies that may touch: filters have been passed and coefficients combined.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct SoftPair {
     pub friction: f64,
     pub restitution: f64,
@@ -54,6 +54,10 @@ const COPLANAR: f64 = 0.9999;
 const PARALLEL: f64 = 0.9;
 /// Depth, in mean edges, beyond which an overlap is left to come apart by itself.
 const DEEPEST: f64 = 1.0;
+/// Depth, in mean edges, of an overlap that another contact of the two has made impossible.
+const LATE: f64 = 2.0;
+/// Angle \[rad\] by which the direction between two edges may miss their normals.
+const ASKEW: f64 = 0.4;
 /// Nearer to the end of an edge than this part of it the node's own row serves.
 const AT_NODE: f64 = 1.0e-3;
 /// Sine of the angle below which edges count as parallel.
@@ -68,8 +72,19 @@ pub(crate) struct BetweenDetector {
     /// Names of the contacts that carried in the last step, ascending.
     carried: Vec<ContactKey>,
     touches: Vec<Touch>,
+    /// When each row closes, as part of the step, and how much it closes in all of it \[m\].
+    closings: Vec<Closing>,
     /// Per surface node: the normal of its row, towards its own body.
     held: [Vec<Option<Vec3>>; 2],
+}
+
+/// How a gap closes without contact.
+#[derive(Clone, Copy)]
+struct Closing {
+    /// Part of the step: zero if the gap is closed already or opens.
+    when: f64,
+    /// \[m\] in the whole step.
+    distance: f64,
 }
 
 /// A node on a triangle.
@@ -82,6 +97,7 @@ struct Touch {
     gap: f64,
     /// By how much the weights miss the triangle.
     miss: f64,
+    closing: Closing,
 }
 
 impl BetweenDetector {
@@ -105,6 +121,7 @@ impl BetweenDetector {
             held.clear();
             held.resize(surface.model.surface.nodes.len(), None);
         }
+        self.closings.clear();
         let first = rows.len();
         let finer = usize::from(b.model.surface.mean_edge < a.model.surface.mean_edge);
         for side in [finer, 1 - finer] {
@@ -117,7 +134,22 @@ impl BetweenDetector {
             self.held[1 - finer] = self.held[finer].clone();
         }
         self.cross(pair, surfaces, rows);
+        self.drop_late(surfaces, first, rows);
         rows[first..].sort_unstable_by_key(|row| row.key);
+    }
+
+    /// Drops rows that would close only when the bodies have gone through one another somewhere else: what
+    /// stops them there keeps them from it.
+    fn drop_late(&self, surfaces: [&SoftSurface<'_>; 2], first: usize, rows: &mut Vec<Row>) {
+        let edge = surfaces.iter().map(|s| s.model.surface.mean_edge).fold(f64::INFINITY, f64::min);
+        let earliest = self.closings.iter().map(|c| c.when).fold(1.0, f64::min);
+        let mut closings = self.closings.iter();
+        let mut place = 0;
+        rows.retain(|_| {
+            place += 1;
+            let own = if place > first { closings.next() } else { None };
+            own.is_none_or(|c| (c.when - earliest) * c.distance < LATE * edge)
+        });
     }
 
     /// Lists what is to be looked at closely.
@@ -189,6 +221,7 @@ impl BetweenDetector {
                     _ => ([other_side, own_side], -touch.normal),
                 };
                 rows.push(pair.row(sides, normal, touch.gap, key(touch.triangle as u32)));
+                self.closings.push(touch.closing);
             }
         }
         self.touches = touches;
@@ -231,7 +264,15 @@ impl BetweenDetector {
                 Side::Soft { body, nodes: [i, j, 0], weights: [1.0 - t, t, 0.0] }
             };
             rows.push(pair.row([soft(0, a.body), soft(1, b.body)], crossing.normal, crossing.gap, key));
+            self.closings.push(crossing.closing);
         }
+    }
+}
+
+impl Closing {
+    fn new(gap: f64, distance: f64) -> Self {
+        let when = if gap > 0.0 && distance > 0.0 { (gap / distance).min(1.0) } else { 0.0 };
+        Self { when, distance }
     }
 }
 
@@ -272,7 +313,8 @@ fn on_triangle(
     let way = own.target[node] - x;
     let ways = nodes.map(|n| other.target[n] - other.x[n]);
     let closing = normal.dot(&((ways[0] + ways[1] + ways[2]) / 3.0 - way));
-    let when = if height > 0.0 && closing > 0.0 { (height / closing).min(1.0) } else { 0.0 };
+    let closing = Closing::new(height, closing);
+    let when = closing.when;
     let met = [0, 1, 2].map(|k| corners[k] + ways[k] * when);
     let weights = barycentric(&met, &(x + way * when))?;
     let miss = weights.iter().fold(0.0, |miss: f64, w| miss.max(-w));
@@ -284,7 +326,7 @@ fn on_triangle(
     let weights = weights.map(|w| w / sum);
     let foot = a * weights[0] + b * weights[1] + c * weights[2];
     let gap = normal.dot(&(x - foot));
-    Some(Touch { triangle: t, weights, normal, gap, miss })
+    Some(Touch { triangle: t, weights, normal, gap, miss, closing })
 }
 
 /// Two edges across one another.
@@ -294,6 +336,7 @@ struct Crossing {
     /// From the second body to the first.
     normal: Vec3,
     gap: f64,
+    closing: Closing,
 }
 
 /// Edges of two bodies that cross within the step, `room` being the part of an edge beyond its ends that
@@ -314,11 +357,7 @@ fn crossing(a: &SoftSurface<'_>, ea: usize, b: &SoftSurface<'_>, eb: usize, room
     let towards =
         |n: &Vec3| outward_b[0].dot(n) + outward_b[1].dot(n) - outward_a[0].dot(n) - outward_a[1].dot(n);
     let normal = if towards(&normal) < 0.0 { -normal } else { normal };
-    let faces = |n: &Vec3, outward: &[Vec3; 2]| {
-        let both = outward.iter().all(|o| o.dot(n) > FACING);
-        both && (outward[0] + outward[1]).dot(n) > 0.5 * (outward[0] + outward[1]).norm()
-    };
-    if !faces(&-normal, &outward_a) || !faces(&normal, &outward_b) {
+    if !looks_along(a, ea, &outward_a, &-normal) || !looks_along(b, eb, &outward_b, &normal) {
         return None;
     }
     let height = normal.dot(&(p - q));
@@ -335,14 +374,33 @@ fn crossing(a: &SoftSurface<'_>, ea: usize, b: &SoftSurface<'_>, eb: usize, room
     };
     let way = move_of(a, [i, j]) - move_of(b, [k, l]);
     let closing = -normal.dot(&way);
-    let when = if height > 0.0 && closing > 0.0 { (height / closing).min(1.0) } else { 0.0 };
+    let closing = Closing::new(height, closing);
+    let when = closing.when;
     // In the plane of both: p + s u = q + t v.
     let w = q - p - way * when;
     let squared = length * length;
     let s = w.cross(&v).dot(&across) / squared;
     let t = w.cross(&u).dot(&across) / squared;
     let inside = |t: f64| t > -room && t < 1.0 + room;
-    (inside(s) && inside(t)).then_some(Crossing { places: [s, t], normal, gap: height })
+    (inside(s) && inside(t)).then_some(Crossing { places: [s, t], normal, gap: height, closing })
+}
+
+/// Whether a direction across an edge is between the normals of its two triangles, or nearly; of an edge that
+/// is no ridge, nearly their mean.
+fn looks_along(s: &SoftSurface<'_>, edge: usize, outward: &[Vec3; 2], direction: &Vec3) -> bool {
+    let sum = outward[0] + outward[1];
+    let length = sum.norm();
+    if !(length > 0.0) {
+        return false;
+    }
+    let surface = &s.model.surface;
+    let [i, _] = surface.edges[edge].map(|n| s.x[n as usize]);
+    // The second triangle's third corner is below the first one's plane at a ridge.
+    let second = surface.triangles[surface.edge_triangles[edge][1] as usize];
+    let lowest = second.iter().map(|&n| outward[0].dot(&(s.x[n as usize] - i))).fold(0.0, f64::min);
+    let highest = second.iter().map(|&n| outward[0].dot(&(s.x[n as usize] - i))).fold(0.0, f64::max);
+    let half = if -lowest > highest { (0.5 * length).min(1.0).acos() } else { 0.0 };
+    direction.dot(&sum) >= length * (half + ASKEW).min(std::f64::consts::PI).cos()
 }
 
 /// Outward normals of the two triangles on an edge.
@@ -360,7 +418,9 @@ fn are_neighbours(s: &SoftSurface<'_>, node: usize, triangle: usize) -> bool {
     s.model.surface.triangles[triangle].iter().any(|&n| near_in_mesh(s.model, node, n))
 }
 
-/// Whether two nodes are the same or share a tetrahedron.
+/// Whether two nodes are the same, neighbours, or have a neighbour in common: nothing can come between those
+/// but a crease sharper than the mesh can show.
 fn near_in_mesh(model: &DeformableModel, a: u32, b: u32) -> bool {
-    a == b || model.adjacency[a as usize].binary_search(&b).is_ok()
+    let [of_a, of_b] = [a, b].map(|n| &model.adjacency[n as usize]);
+    a == b || of_a.binary_search(&b).is_ok() || of_a.iter().any(|n| of_b.binary_search(n).is_ok())
 }

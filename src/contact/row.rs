@@ -50,6 +50,9 @@ pub(crate) struct Row {
     pub warm_shift_rate: f64,
     /// Where it acted in the last step.
     pub warm_geometry: Option<ContactGeometry>,
+    /// What to add to the motion along the normal so that zero is where the step is to end \[m\]: the gap,
+    /// restitution and bounded recovery. The solver's.
+    pub goal: f64,
 }
 
 impl Row {
@@ -66,6 +69,7 @@ impl Row {
             warm_force: Vec3::zeros(),
             warm_shift_rate: 0.0,
             warm_geometry: None,
+            goal: gap,
         }
     }
 

@@ -14,7 +14,9 @@ pub(super) struct Encounters {
     boxes: Vec<(Aabb, usize)>,
     /// Bodies that sleep beside others, as obstacles until they are woken.
     dormant: Vec<BodyWork>,
+    /// The pairs of this step first, then memory for more.
     pairs: Vec<Encounter>,
+    count: usize,
     /// Bodies tied to one another, which do not collide.
     tied: Vec<[DeformableBodyHandle; 2]>,
     /// Sleeping bodies that were touched.
@@ -22,6 +24,7 @@ pub(super) struct Encounters {
 }
 
 /// Two bodies, or one with itself.
+#[derive(Default)]
 struct Encounter {
     /// Places, the older handle first.
     ends: [usize; 2],
@@ -40,7 +43,7 @@ impl Encounters {
         for work in works.iter_mut() {
             work.in_company = false;
         }
-        for end in self.pairs.iter().flat_map(|pair| pair.ends) {
+        for end in self.pairs[..self.count].iter().flat_map(|pair| pair.ends) {
             match works.get_mut(end) {
                 Some(work) => work.in_company = true,
                 None => self.dormant[end - works.len()].in_company = true,
@@ -51,13 +54,13 @@ impl Encounters {
         let (works, dormant) = (&*works, &self.dormant);
         let work = |place: usize| works.get(place).unwrap_or_else(|| &dormant[place - works.len()]);
         let surface = |place: usize| work(place).surface(place, &deformables[work(place).handle]);
-        for_each(&mut self.pairs, |encounter| {
+        for_each(&mut self.pairs[..self.count], |encounter| {
             let [a, b] = encounter.ends.map(surface);
             let memory = &deformables[work(encounter.ends[0]).handle].state.contacts;
             encounter.rows.clear();
             encounter.detector.detect(&encounter.pair, [&a, &b], memory, &mut encounter.rows);
         });
-        for encounter in self.pairs.iter().filter(|pair| !pair.rows.is_empty()) {
+        for encounter in self.pairs[..self.count].iter().filter(|pair| !pair.rows.is_empty()) {
             let sleeping = encounter.ends.iter().filter_map(|end| end.checked_sub(works.len()));
             self.woken.extend(sleeping.map(|place| dormant[place].handle));
         }
@@ -67,7 +70,7 @@ impl Encounters {
 
     /// Appends the contacts that were found last, with what bodies remember of them.
     pub fn take_rows(&self, works: &[BodyWork], deformables: &DeformableBodySet, rows: &mut Vec<Row>) {
-        for encounter in &self.pairs {
+        for encounter in &self.pairs[..self.count] {
             let body = &deformables[works[encounter.ends[0]].handle];
             let held = |side: &Side| match side {
                 Side::Soft { body, .. } => works[*body].holds_all(side),
@@ -86,7 +89,7 @@ impl Encounters {
 
     /// Number of pairs looked at closely.
     pub fn pair_count(&self) -> usize {
-        self.pairs.len()
+        self.count
     }
 
     /// Boxes of all bodies that are stepped, and of those that sleep beside them.
@@ -114,17 +117,20 @@ impl Encounters {
             }
         }
         self.tied.sort_unstable();
-        self.boxes.sort_by(|a, b| a.0.mins.x.total_cmp(&b.0.mins.x).then(a.1.cmp(&b.1)));
+        self.boxes.sort_unstable_by(|a, b| a.0.mins.x.total_cmp(&b.0.mins.x).then(a.1.cmp(&b.1)));
+        let dormant = &self.dormant;
         let handle = |place: usize| match works.get(place) {
             Some(work) => work.handle,
-            None => self.dormant[place - works.len()].handle,
+            None => dormant[place - works.len()].handle,
         };
-        let mut memory = std::mem::take(&mut self.pairs);
-        let mut pairs = Vec::with_capacity(memory.len());
+        self.count = 0;
+        let (pairs, count) = (&mut self.pairs, &mut self.count);
         let mut add = |ends: [usize; 2], pair: SoftPair| {
-            let old = memory.pop().map(|old| (old.detector, old.rows));
-            let (detector, rows) = old.unwrap_or_default();
-            pairs.push(Encounter { ends, pair, detector, rows });
+            if *count == pairs.len() {
+                pairs.push(Encounter::default());
+            }
+            (pairs[*count].ends, pairs[*count].pair) = (ends, pair);
+            *count += 1;
         };
         for (i, (aabb, place)) in self.boxes.iter().enumerate() {
             let own = &deformables[handle(*place)];
@@ -137,7 +143,7 @@ impl Encounters {
                 if ends.iter().all(|end| *end >= works.len()) {
                     continue;
                 }
-                ends.sort_by_key(|end| handle(*end));
+                ends.sort_unstable_by_key(|end| handle(*end));
                 let handles = ends.map(handle);
                 let [a, b] = handles.map(|h| &deformables[h]);
                 let collide = a.collision_groups().test(b.collision_groups());
@@ -146,8 +152,7 @@ impl Encounters {
                 }
             }
         }
-        pairs.sort_by_key(|pair| pair.ends.map(handle));
-        self.pairs = pairs;
+        self.pairs[..self.count].sort_unstable_by_key(|pair| pair.ends.map(handle));
     }
 }
 

@@ -247,11 +247,15 @@ impl IslandWork {
         }
     }
 
+    fn active_rows(&self) -> impl Iterator<Item = (usize, &Row)> {
+        let contacts = &self.island.contacts;
+        contacts.rows[..contacts.active()].iter().enumerate()
+    }
+
     /// What closure and attachments leave to the next step, ascending by key.
     pub fn memory_of_links(&self, h: f64, memory: &mut Vec<ContactMemory>) {
         memory.clear();
-        let rows = self.island.contacts.rows.iter().enumerate();
-        let links = rows.filter(|(_, row)| row.key.is_link());
+        let links = self.active_rows().filter(|(_, row)| row.key.is_link());
         memory.extend(links.map(|(i, _)| self.island.contacts.memory(i, h)));
         memory.sort_unstable_by_key(|m| m.key);
     }
@@ -259,9 +263,8 @@ impl IslandWork {
     /// What the contacts of a member leave to the next step, ascending by key.
     pub fn memory_of(&self, member: usize, h: f64, memory: &mut Vec<ContactMemory>) {
         memory.clear();
-        let rows = self.island.contacts.rows.iter().enumerate();
         let own = |row: &Row| matches!(row.sides[0], Side::Soft { body, .. } if body == member);
-        let own = rows.filter(|(_, row)| own(row) && !row.key.is_link());
+        let own = self.active_rows().filter(|(_, row)| own(row) && !row.key.is_link());
         memory.extend(own.map(|(i, _)| self.island.contacts.memory(i, h)));
         memory.sort_unstable_by_key(|m| m.key);
     }

@@ -1,7 +1,8 @@
 //! The contacts of an island as a cone problem: gaps, warm starts, goals, and the forces on both sides.
 //!
 //! Directions stay fixed within a step, and W unless a body's frame or scaling changes; gaps are taken
-//! anew in every iteration.
+//! anew in every iteration. Detection finds whatever might touch within the step; the problem holds what
+//! carried in the last one or is about to close, and takes in what is found to close when it does.
 
 use super::body_problem::BodyProblem;
 use super::cone_newton::{ConeProblem, ConeSolver, ConeTolerance, ConeWork};
@@ -16,7 +17,11 @@ use crate::math::Vec3;
 /// Contacts of the bodies of one island.
 #[derive(Default)]
 pub(crate) struct ContactSystem {
+    /// All that might touch; those that are in the problem first.
     pub rows: Vec<Row>,
+    active: usize,
+    /// Ends of the gaps of the others \[m\].
+    open: Vec<f64>,
     problem: ConeProblem,
     groups: ContactGroups,
     solver: ConeSolver,
@@ -24,8 +29,6 @@ pub(crate) struct ContactSystem {
     pub lambda: Vec<f64>,
     /// De Saxcé shift of each contact \[m\].
     pub shift: Vec<f64>,
-    /// What each gap has to reach at the end of the step \[m\]: restitution and bounded recovery.
-    goals: Vec<f64>,
     g_free: Vec<f64>,
     /// W λ.
     slips: Vec<f64>,
@@ -55,32 +58,95 @@ impl ContactSystem {
         self.rows.is_empty()
     }
 
-    /// Packs the rows for a step of `h` \[s\], with their warm starts, which are laid on the nodes.
+    /// Number of contacts in the problem: they are the first of the rows.
+    pub fn active(&self) -> usize {
+        self.active
+    }
+
+    /// Packs the rows for a step of `h` \[s\] that carried in the last one, or hold, with their warm
+    /// starts, which are laid on the nodes.
     pub fn begin(&mut self, bodies: &mut [BodyProblem], partners: &Partners, h: f64, limits: &ContactLimits) {
-        self.groups.arrange(&mut self.rows, partners);
+        for row in &mut self.rows {
+            row.goal = goal(row, bodies, partners, h, limits);
+        }
+        self.open.clear();
+        let carries = |row: &Row| row.warm_force != Vec3::zeros() || row.key.is_link();
+        self.rows.sort_unstable_by_key(|row| !carries(row));
+        self.active = self.rows.partition_point(carries);
+        self.pack(partners, h);
+        self.lay_forces(bodies);
+    }
+
+    fn pack(&mut self, partners: &Partners, h: f64) {
+        let rows = &mut self.rows[..self.active];
+        self.groups.arrange(rows, partners);
         self.problem.offsets.clear();
         self.problem.offsets.push(0);
         self.problem.laws.clear();
         self.lambda.clear();
         self.shift.clear();
-        self.goals.clear();
         self.geometry.clear();
-        for row in &self.rows {
+        for row in rows {
             self.geometry.push(steady_geometry(row, partners));
             self.lambda.extend(row.directions().iter().map(|d| d.dot(&row.warm_force)));
             self.shift.push(row.warm_shift_rate * h);
             self.problem.offsets.push(self.lambda.len());
             self.problem.laws.push(row.law);
-            self.goals.push(goal(row, bodies, partners, h, limits));
         }
-        self.lay_forces(bodies);
+    }
+
+    /// Takes rows into the problem that end less than `slack`, in mean edges, from touching at the bodies'
+    /// trial positions under the present forces; true if there were such.
+    pub fn take_in(&mut self, bodies: &[BodyProblem], partners: &Partners, h: f64, slack: f64) -> bool {
+        if self.active == self.rows.len() {
+            return false;
+        }
+        let reactions = self.take_reactions(partners, h);
+        self.open.clear();
+        for row in &self.rows[self.active..] {
+            let moved = relative_motion(row, bodies, partners, &reactions, h);
+            self.open.push(row.goal + row.frame[0].dot(&moved));
+        }
+        self.reactions = reactions;
+        let edge = |side: &Side| match side {
+            Side::Soft { body, .. } => bodies[*body].model.surface.mean_edge,
+            Side::Partner { .. } | Side::Turn { .. } => f64::INFINITY,
+        };
+        let closes = |row: &Row, end: f64| end < slack * edge(&row.sides[0]).min(edge(&row.sides[1]));
+        let before = self.active;
+        for i in before..self.rows.len() {
+            if closes(&self.rows[i], self.open[i - before]) {
+                self.rows.swap(self.active, i);
+                self.open.swap(self.active - before, i - before);
+                self.active += 1;
+            }
+        }
+        if self.active == before {
+            return false;
+        }
+        self.open.drain(..self.active - before);
+        for i in 0..before {
+            self.rows[i].warm_force = self.force(i);
+            self.rows[i].warm_shift_rate = self.shift[i] / h;
+            self.rows[i].warm_geometry = Some(self.geometry[i]);
+        }
+        self.pack(partners, h);
+        true
+    }
+
+    fn take_reactions(&mut self, partners: &Partners, h: f64) -> Vec<Reaction> {
+        let mut reactions = std::mem::take(&mut self.reactions);
+        reactions.clear();
+        reactions.resize(partners.list.len(), Reaction::default());
+        self.add_reactions(partners, h, &mut reactions);
+        reactions
     }
 
     /// Assembles W for the current frames and scalings of the bodies, unless the last one was made of
     /// the same bits: so it is at rest.
     pub fn assemble(&mut self, bodies: &[BodyProblem], factors: &FactorCache, partners: &Partners, h: f64) {
         let rows = ContactRows {
-            rows: &self.rows,
+            rows: &self.rows[..self.active],
             geometry: &self.geometry,
             offsets: &self.problem.offsets,
             groups: &self.groups,
@@ -108,24 +174,21 @@ impl ContactSystem {
         h: f64,
         tolerance: ConeTolerance,
     ) -> (ConeWork, bool) {
-        self.reactions.clear();
-        self.reactions.resize(partners.list.len(), Reaction::default());
-        let mut reactions = std::mem::take(&mut self.reactions);
-        self.add_reactions(partners, h, &mut reactions);
+        let reactions = self.take_reactions(partners, h);
         self.g_free.clear();
-        for (row, goal) in self.rows.iter().zip(&self.goals) {
+        for row in &self.rows[..self.active] {
             let moved = relative_motion(row, bodies, partners, &reactions, h);
             let of_forces = &self.slips[self.g_free.len()..];
             let motions = row.directions().iter().map(|d| d.dot(&moved)).zip(of_forces);
             let first = self.g_free.len();
             self.g_free.extend(motions.map(|(motion, by_forces)| motion - by_forces));
             // What the row itself gives way by is no motion of its ends.
-            self.g_free[first] += goal + row.compliance * self.lambda[first];
+            self.g_free[first] += row.goal + row.compliance * self.lambda[first];
         }
         self.reactions = reactions;
         self.before.clone_from(&self.lambda);
         let mut work = ConeWork::default();
-        let slides = self.rows.iter().any(|row| row.dimension() == 3);
+        let slides = self.rows[..self.active].iter().any(|row| row.dimension() == 3);
         for _ in 0..if slides { SHIFT_ROUNDS } else { 1 } {
             self.problem.g.clone_from(&self.g_free);
             for (i, shift) in self.shift.iter().enumerate() {
@@ -154,7 +217,7 @@ impl ContactSystem {
 
     /// σ = μ‖slip‖ of contacts that carry, 0 of open ones.
     fn update_shifts(&mut self) {
-        for i in 0..self.rows.len() {
+        for i in 0..self.active {
             let first = self.problem.offsets[i];
             self.shift[i] = 0.0;
             if let Law::Contact { friction } = self.rows[i].law
@@ -171,7 +234,7 @@ impl ContactSystem {
         for body in bodies.iter_mut() {
             body.contact_force.fill(Vec3::zeros());
         }
-        for (i, row) in self.rows.iter().enumerate() {
+        for (i, row) in self.rows[..self.active].iter().enumerate() {
             let force = self.force(i);
             for (side, sign) in row.sides.iter().zip([1.0, -1.0]) {
                 if let Side::Soft { body, .. } = side {
@@ -185,10 +248,13 @@ impl ContactSystem {
 
     /// Force \[N\] of contact `i` on its side 0.
     pub fn force(&self, i: usize) -> Vec3 {
+        if i >= self.active {
+            return Vec3::zeros();
+        }
         self.rows[i].force(&self.lambda[self.problem.offsets[i]..self.problem.offsets[i + 1]])
     }
 
-    /// What contact `i` leaves to the next step.
+    /// What contact `i` of the problem leaves to the next step.
     pub fn memory(&self, i: usize, h: f64) -> ContactMemory {
         let (key, geometry) = (self.rows[i].key, self.geometry[i]);
         ContactMemory { key, force: self.force(i), shift_rate: self.shift[i] / h, geometry }
@@ -196,13 +262,19 @@ impl ContactSystem {
 
     /// Gap \[m\] of contact `i` at the end of the step.
     pub fn final_gap(&self, i: usize) -> f64 {
-        let normal = self.problem.offsets[i];
-        self.g_free[normal] + self.slips[normal] - self.goals[i] + self.rows[i].gap
+        let to_goal = match i.checked_sub(self.active) {
+            Some(place) => self.open[place],
+            None => {
+                let normal = self.problem.offsets[i];
+                self.g_free[normal] + self.slips[normal]
+            }
+        };
+        to_goal - self.rows[i].goal + self.rows[i].gap
     }
 
     /// Adds what the contacts do to the partners over the step.
     pub fn add_reactions(&self, partners: &Partners, h: f64, reactions: &mut [Reaction]) {
-        for (i, row) in self.rows.iter().enumerate() {
+        for (i, row) in self.rows[..self.active].iter().enumerate() {
             let force = self.force(i);
             if force == Vec3::zeros() {
                 continue;

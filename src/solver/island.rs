@@ -22,6 +22,18 @@ pub(crate) struct Island {
     pub contacts: ContactSystem,
     pub report: IslandReport,
     accelerations: Vec<Lbfgs>,
+    assembly: Assembly,
+}
+
+/// What is to be done to the contact problem before it is solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+enum Assembly {
+    #[default]
+    Done,
+    /// Frames or scalings are others.
+    Refreshed,
+    /// The contacts are others.
+    Anew,
 }
 
 /// How the step of an island went.
@@ -44,6 +56,12 @@ enum Outcome {
     Stalled,
 }
 
+/// Contact problems in one iteration.
+const ROUNDS: usize = 4;
+/// Distance, in mean edges, within which a contact is taken into the problem before it is solved.
+const NEARLY_CLOSED: f64 = 0.01;
+/// As [`NEARLY_CLOSED`], once it has been solved.
+const OVERLAPPING: f64 = -1.0e-5;
 /// Largest factor on A that the guard tries.
 const MAX_SCALING: f64 = 1024.0;
 /// Residual relative to the forces that is rounding and nothing else: sums of some tens of terms.
@@ -57,11 +75,8 @@ impl Island {
         for body in &mut self.bodies {
             body.choose_start(factors.get(body.factor));
         }
-        if !self.contacts.is_empty() {
-            self.contacts.begin(&mut self.bodies, partners, h, limits);
-            self.assemble_contacts(factors, partners, h);
-            self.contacts.expect();
-        }
+        self.contacts.begin(&mut self.bodies, partners, h, limits);
+        self.assembly = Assembly::Anew;
         self.accelerations.resize_with(self.bodies.len(), Lbfgs::default);
         self.accelerations.iter_mut().for_each(Lbfgs::clear);
         let iterations = self.bodies.iter().map(|b| b.settings.max_iterations).max().unwrap_or(0);
@@ -81,7 +96,7 @@ impl Island {
             if !self.contacts.is_empty() {
                 let turned = self.bodies.iter_mut().filter_map(|b| b.refresh_frame().then_some(()));
                 if turned.count() > 0 {
-                    self.assemble_contacts(factors, partners, h);
+                    self.assembly = self.assembly.max(Assembly::Refreshed);
                 }
             }
         }
@@ -146,8 +161,8 @@ impl Island {
             if descends {
                 break;
             }
-            if rescaled && !self.contacts.is_empty() {
-                self.assemble_contacts(factors, partners, h);
+            if rescaled {
+                self.assembly = self.assembly.max(Assembly::Refreshed);
             }
         }
         for (body, acceleration) in self.bodies.iter_mut().zip(&mut self.accelerations) {
@@ -159,12 +174,22 @@ impl Island {
         outcome
     }
 
+    /// Brings W up to date, and the solver's expectation where the problem is another one.
     fn assemble_contacts(&mut self, factors: &FactorCache, partners: &Partners, h: f64) {
+        let assembly = std::mem::take(&mut self.assembly);
+        if assembly == Assembly::Done {
+            return;
+        }
         let (contacts, bodies) = (&mut self.contacts, &self.bodies);
         let time = &mut self.report.effort.contact_time;
         timed(time, || contacts.assemble(bodies, factors, partners, h));
+        if assembly == Assembly::Anew {
+            self.contacts.expect();
+        }
     }
 
+    /// Solves the contacts at the trial positions and moves the bodies to what comes of it; again for those
+    /// that were thought to stay open and did not.
     fn solve_contacts(&mut self, factors: &FactorCache, partners: &Partners, h: f64, limits: &ContactLimits) {
         let heaviest = self.bodies.iter().map(|b| b.weight).fold(0.0, f64::max);
         let tolerance = ConeTolerance {
@@ -172,13 +197,23 @@ impl Island {
             // Without gravity or forces any positive number serves as the scale of nothing.
             floor: (1e-3 * heaviest).max(1e-12),
         };
-        let (contacts, bodies) = (&mut self.contacts, &mut self.bodies);
-        let time = &mut self.report.effort.contact_time;
-        let (work, changed) = timed(time, || contacts.solve(bodies, partners, h, tolerance));
-        self.report.newton_steps += work.newton_steps;
-        self.report.cone_factorizations += work.factorizations;
-        self.report.cone_failures += work.failures;
-        if changed {
+        for round in 0..ROUNDS {
+            let slack = if round == 0 { NEARLY_CLOSED } else { OVERLAPPING };
+            if self.contacts.take_in(&self.bodies, partners, h, slack) {
+                self.assembly = Assembly::Anew;
+            } else if round > 0 {
+                break;
+            }
+            self.assemble_contacts(factors, partners, h);
+            let (contacts, bodies) = (&mut self.contacts, &mut self.bodies);
+            let time = &mut self.report.effort.contact_time;
+            let (work, changed) = timed(time, || contacts.solve(bodies, partners, h, tolerance));
+            self.report.newton_steps += work.newton_steps;
+            self.report.cone_factorizations += work.factorizations;
+            self.report.cone_failures += work.failures;
+            if !changed {
+                break;
+            }
             for body in &mut self.bodies {
                 body.contact_step(factors.get(body.factor));
             }

@@ -337,7 +337,7 @@ fn solved_contacts_obey_signorini_and_coulomb() {
     island.solve(&cache, &partner, H, &LIMITS);
     let contacts: &ContactSystem = &island.contacts;
     let mut carrying = 0;
-    for i in 0..contacts.rows.len() {
+    for i in 0..contacts.active() {
         let l = &contacts.lambda[3 * i..3 * i + 3];
         let gap = contacts.final_gap(i);
         // Lengths are of 1e-3 m over a step; the regularisation (ε = 1e-4) and the lagging shift of
