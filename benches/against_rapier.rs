@@ -5,8 +5,11 @@
 //! mesh (damped steps of foible3d to a residual of 1e-8), of cubes the distance of the lowest node from the
 //! floor at the end, hover or penetration; `deepest ever` is penetration at any time. `-- quick` leaves out what takes rapier's `fem` minutes.
 
+mod shared;
+
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
+use shared::rapier_body;
 use std::fmt::Write as _;
 use std::time::Instant;
 
@@ -159,29 +162,11 @@ fn run_rapier(setting: &str, items: &[Item], floor: bool, steps: usize) -> Outco
         .map(|item| {
             let mesh = item.mesh();
             let pose = Pose::new(item.at.into(), item.turn);
-            let positions: Vec<Vector> = mesh
-                .vertices()
-                .iter()
-                .map(|v| pose.transform_point(Vector::from(v.map(|c| c as f32))))
-                .collect();
-            let mut masses = vec![0.0f32; positions.len()];
-            for (tet, volume) in mesh.tetrahedra().iter().zip(mesh.volumes()) {
-                tet.iter().for_each(|&v| masses[v as usize] += (1000.0 * volume / 4.0) as f32);
-            }
             let rest = |v: u32| mesh.vertices()[v as usize];
-            let mut builder = SoftBodyBuilder::new(positions)
-                .cells(mesh.tetrahedra().to_vec())
-                .masses(masses)
-                .cell_model(SoftBodyCellModel::Corotational)
-                .material(SoftBodyMaterial {
-                    young_modulus: item.e as f32,
-                    poisson_ratio: item.nu as f32,
-                    ..Default::default()
-                })
+            let mut builder = rapier_body(&mesh, pose, item.e, item.nu)
                 .linear_damping(item.damping as f32)
                 .solver(if setting == "default" { SoftBodySolver::default() } else { SoftBodySolver::Fem })
-                .pinned_particles((0..mesh.vertices().len() as u32).filter(|&v| item.is_clamped(rest(v))))
-                .can_sleep(false);
+                .pinned_particles((0..mesh.vertices().len() as u32).filter(|&v| item.is_clamped(rest(v))));
             if floor {
                 builder = builder.surface_collider(ColliderBuilder::ball(0.05).density(0.0).friction(0.5));
             } else {

@@ -3,15 +3,13 @@
 //! Time per element beside the number of elements, bytes per second of the solves beside those of a
 //! memory copy, memory per body, and what many equal bodies cost on one and on all threads.
 
+mod shared;
+
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
+use shared::median;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
-
-fn median(mut of: Vec<f64>) -> f64 {
-    of.sort_by(f64::total_cmp);
-    of[of.len() / 2]
-}
 
 fn in_pool<T: Send>(threads: usize, f: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool").install(f)

@@ -6,17 +6,14 @@
 
 #[path = "../examples/gripper/scene.rs"]
 mod gripper;
+mod shared;
 
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
+use shared::{median, rapier_body};
 use std::time::Instant;
 
 const STEPS: usize = 300;
-
-fn median(mut of: Vec<f64>) -> f64 {
-    of.sort_by(f64::total_cmp);
-    of[of.len() / 2]
-}
 
 fn rigid_boxes(physics: &mut PhysicsWorld, count: usize) -> RigidBodyHandle {
     let floor = RigidBodyBuilder::fixed().translation(Vector::Y * -0.5);
@@ -88,20 +85,10 @@ fn theirs(scene: &str, count: usize, cells: [usize; 3], e: f64) {
     let mut physics = PhysicsWorld::new();
     let top = rigid_boxes(&mut physics, count);
     let mesh = TetMesh::cuboid([0.2; 3], cells).expect("a valid lattice");
-    let mut masses = vec![0.0f32; mesh.vertices().len()];
-    for (tet, volume) in mesh.tetrahedra().iter().zip(mesh.volumes()) {
-        tet.iter().for_each(|&v| masses[v as usize] += (1000.0 * volume / 4.0) as f32);
-    }
     for k in (0..count).step_by(2) {
-        let at = Vector::Y * (0.2 + 0.4 * k as f32);
-        let positions = mesh.vertices().iter().map(|v| Vector::from(v.map(|c| c as f32)) + at).collect();
-        let builder = SoftBodyBuilder::new(positions)
-            .cells(mesh.tetrahedra().to_vec())
-            .masses(masses.clone())
-            .cell_model(SoftBodyCellModel::Corotational)
-            .material(SoftBodyMaterial { young_modulus: e as f32, poisson_ratio: 0.3, ..Default::default() })
-            .surface_collider(ColliderBuilder::ball(0.05).density(0.0).friction(0.5))
-            .can_sleep(false);
+        let at = Pose::from_translation(Vector::Y * (0.2 + 0.4 * k as f32));
+        let surface = ColliderBuilder::ball(0.05).density(0.0).friction(0.5);
+        let builder = rapier_body(&mesh, at, e, 0.3).surface_collider(surface);
         physics.insert_soft_body(builder);
     }
     let mut times = Vec::new();
