@@ -25,6 +25,8 @@ pub(crate) struct SoftSurface<'a> {
     /// Nodes at the start of the step, and where they would go without contact.
     pub x: &'a [Vec3],
     pub target: &'a [Vec3],
+    /// Unit normals of the triangles; zero for those without area.
+    pub faces: &'a [Vec3],
     /// Per surface node: the body's normal, and how far the node may come.
     pub normals: &'a [Vec3],
     pub reach: &'a [f64],
@@ -157,20 +159,27 @@ impl BetweenDetector {
         self.on_triangles.iter_mut().for_each(Vec::clear);
         self.edges.clear();
         let [of_a, of_b] = &mut self.on_triangles;
+        // Every node and every edge is looked at with one of its triangles, whose box holds it.
         let index = |s: &SoftSurface<'_>, n: u32| s.model.surface.index_of_node[n as usize];
+        let at_node =
+            |s: &SoftSurface<'_>, t: u32, n: u32| s.model.surface.node_triangle[index(s, n) as usize] == t;
+        let on_edge =
+            |s: &SoftSurface<'_>, t: u32, e: u32| s.model.surface.edge_triangles[e as usize][0] == t;
         for (ta, tb) in a.tree.pairs(b.tree) {
             let (s, t) = (&a.model.surface, &b.model.surface);
-            of_a.extend(s.triangles[ta as usize].iter().map(|&n| (index(a, n), tb)));
+            let own = s.triangles[ta as usize].iter().filter(|&&n| at_node(a, ta, n));
+            of_a.extend(own.map(|&n| (index(a, n), tb)));
             if !itself {
-                of_b.extend(t.triangles[tb as usize].iter().map(|&n| (index(b, n), ta)));
+                let own = t.triangles[tb as usize].iter().filter(|&&n| at_node(b, tb, n));
+                of_b.extend(own.map(|&n| (index(b, n), ta)));
             }
-            let across = |ea: u32| t.triangle_edges[tb as usize].map(|eb| (ea, eb));
-            let crossing = s.triangle_edges[ta as usize].into_iter().flat_map(across);
-            self.edges.extend(crossing.filter(|(ea, eb)| !itself || ea < eb));
+            for ea in s.triangle_edges[ta as usize].into_iter().filter(|&e| on_edge(a, ta, e)) {
+                let others = t.triangle_edges[tb as usize].into_iter().filter(|&e| on_edge(b, tb, e));
+                self.edges.extend(others.map(|eb| (ea, eb)).filter(|(ea, eb)| !itself || ea < eb));
+            }
         }
         for list in [of_a, of_b, &mut self.edges] {
             list.sort_unstable();
-            list.dedup();
         }
     }
 
@@ -298,8 +307,8 @@ fn on_triangle(
     let nodes = other.model.surface.triangles[t].map(|n| n as usize);
     let corners = nodes.map(|n| other.x[n]);
     let [a, b, c] = corners;
-    let normal = (b - a).cross(&(c - a)).try_normalize(0.0)?;
-    if normal.dot(&own.normals[s]) > FACING {
+    let normal = other.faces[t];
+    if normal == Vec3::zeros() || normal.dot(&own.normals[s]) > FACING {
         return None;
     }
     let x = own.x[node];
@@ -352,21 +361,24 @@ fn crossing(a: &SoftSurface<'_>, ea: usize, b: &SoftSurface<'_>, eb: usize, room
         return None;
     }
     let normal = across / length;
-    let [outward_a, outward_b] = [edge_normals(a, ea), edge_normals(b, eb)];
-    // From b to a: into a, out of b.
-    let towards =
-        |n: &Vec3| outward_b[0].dot(n) + outward_b[1].dot(n) - outward_a[0].dot(n) - outward_a[1].dot(n);
-    let normal = if towards(&normal) < 0.0 { -normal } else { normal };
-    if !looks_along(a, ea, &outward_a, &-normal) || !looks_along(b, eb, &outward_b, &normal) {
-        return None;
-    }
-    let height = normal.dot(&(p - q));
     let reach_of = |s: &SoftSurface<'_>, ends: [usize; 2]| {
         ends.map(|n| s.reach[s.model.surface.index_of_node[n] as usize]).into_iter().fold(0.0, f64::max)
     };
     let reach = reach_of(a, [i, j]) + reach_of(b, [k, l]);
     let deepest = DEEPEST * a.model.surface.mean_edge.min(b.model.surface.mean_edge);
-    if !(height < reach && height > -deepest) {
+    let height = normal.dot(&(p - q));
+    if !(height.abs() < reach.max(deepest)) {
+        return None;
+    }
+    let faces =
+        |s: &SoftSurface<'_>, e: usize| s.model.surface.edge_triangles[e].map(|t| s.faces[t as usize]);
+    let [outward_a, outward_b] = [faces(a, ea), faces(b, eb)];
+    // From b to a: into a, out of b.
+    let towards = outward_b[0] + outward_b[1] - outward_a[0] - outward_a[1];
+    let sign = if towards.dot(&normal) < 0.0 { -1.0 } else { 1.0 };
+    let (normal, height) = (normal * sign, height * sign);
+    let within = height < reach && height > -deepest;
+    if !within || !looks_along(a, ea, &outward_a, &-normal) || !looks_along(b, eb, &outward_b, &normal) {
         return None;
     }
     let move_of = |s: &SoftSurface<'_>, ends: [usize; 2]| {
@@ -399,17 +411,10 @@ fn looks_along(s: &SoftSurface<'_>, edge: usize, outward: &[Vec3; 2], direction:
     let second = surface.triangles[surface.edge_triangles[edge][1] as usize];
     let lowest = second.iter().map(|&n| outward[0].dot(&(s.x[n as usize] - i))).fold(0.0, f64::min);
     let highest = second.iter().map(|&n| outward[0].dot(&(s.x[n as usize] - i))).fold(0.0, f64::max);
-    let half = if -lowest > highest { (0.5 * length).min(1.0).acos() } else { 0.0 };
-    direction.dot(&sum) >= length * (half + ASKEW).min(std::f64::consts::PI).cos()
-}
-
-/// Outward normals of the two triangles on an edge.
-fn edge_normals(s: &SoftSurface<'_>, edge: usize) -> [Vec3; 2] {
-    let surface = &s.model.surface;
-    surface.edge_triangles[edge].map(|t| {
-        let [a, b, c] = surface.triangles[t as usize].map(|n| s.x[n as usize]);
-        (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default()
-    })
+    // The cosine of half the angle between the two normals, and of that and some more.
+    let half = if -lowest > highest { (0.5 * length).min(1.0) } else { 1.0 };
+    let (sin, cos) = ASKEW.sin_cos();
+    direction.dot(&sum) >= length * (half * cos - (1.0 - half * half).sqrt() * sin)
 }
 
 /// Whether a surface node and a triangle of the same body are too near in the mesh to touch.

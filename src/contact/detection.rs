@@ -30,6 +30,8 @@ const FIRST_POINT: u32 = 1;
 /// Finds contacts; holds the memory it needs between calls.
 #[derive(Default)]
 pub(crate) struct Detector {
+    /// Normals of the surface's triangles.
+    pub faces: Vec<Vec3>,
     /// Per surface node, in the world: normal, and how far the node may come.
     pub normals: Vec<Vec3>,
     pub reach: Vec<f64>,
@@ -63,10 +65,13 @@ impl Detector {
         let surface = &model.surface;
         self.normals.clear();
         self.normals.resize(surface.nodes.len(), Vec3::zeros());
+        self.faces.clear();
         for triangle in &surface.triangles {
             let [a, b, c] = triangle.map(|n| x[n as usize]);
             let area = (b - a).cross(&(c - a));
             triangle.iter().for_each(|&n| self.normals[surface.index_of_node[n as usize] as usize] += area);
+            // None for a triangle that has shrunk to nothing.
+            self.faces.push(area.try_normalize(0.0).unwrap_or_default());
         }
         // A node whose triangles cancel has no outside; any direction serves.
         self.normals.iter_mut().for_each(|n| *n = n.try_normalize(0.0).unwrap_or(Vec3::y()));

@@ -19,6 +19,8 @@ pub(crate) struct Surface {
     pub triangle_edges: Vec<[u32; 3]>,
     /// The two triangles on each edge.
     pub edge_triangles: Vec<[u32; 2]>,
+    /// A triangle at each surface node.
+    pub node_triangle: Vec<u32>,
     /// Index into `nodes` per mesh node; `u32::MAX` inside the body.
     pub index_of_node: Vec<u32>,
     /// Mean length of the edges at rest \[m\].
@@ -46,9 +48,22 @@ impl Surface {
                 pair[usize::from(pair[0] != u32::MAX)] = t as u32;
             }
         }
+        let mut node_triangle = vec![0; nodes.len()];
+        for (t, triangle) in triangles.iter().enumerate() {
+            triangle.iter().for_each(|&n| node_triangle[index_of_node[n as usize] as usize] = t as u32);
+        }
         let length = |e: &[u32; 2]| (rest[e[0] as usize] - rest[e[1] as usize]).norm();
         let mean_edge = edges.iter().map(length).sum::<f64>() / edges.len().max(1) as f64;
-        Self { triangles, nodes, edges, triangle_edges, edge_triangles, index_of_node, mean_edge }
+        Self {
+            triangles,
+            nodes,
+            edges,
+            triangle_edges,
+            edge_triangles,
+            node_triangle,
+            index_of_node,
+            mean_edge,
+        }
     }
 }
 

@@ -81,6 +81,7 @@ impl BodyWork {
             model: &body.model,
             x: &body.state.x,
             target: self.problem.as_ref().map_or(&body.state.x, |problem| &problem.target),
+            faces: &self.detector.faces,
             normals: &self.detector.normals,
             reach: &self.detector.reach,
             tree: &self.tree,
