@@ -1,6 +1,6 @@
 //! A scene file turned into a rapier world and a deformable one.
 
-use super::file::{self, Body, Kind, Quantity, Scene, Shape};
+use super::file::{self, Body, JointKind, Kind, Quantity, Scene, Shape};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 use std::path::Path;
@@ -52,6 +52,7 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
         let (body, collider) = stage.physics.insert(builder, collider);
         stage.rigid.push((name, body, collider));
     }
+    scene.joint.iter().try_for_each(|joint| stage.join(joint))?;
     for body in &scene.deformable {
         let name = body.name.as_ref().clone();
         let handle = stage.world.insert(deformable(body, folder));
@@ -124,16 +125,55 @@ fn deformable(body: &file::Deformable, folder: &Path) -> DeformableBodyBuilder {
         .settings(settings)
         // What a scene expects of rest is to be found awake.
         .can_sleep(false);
-    match body.pinned {
-        Some(region) => {
-            let (low, high) = (Vector::from(region.min), Vector::from(region.max));
-            builder.pinned(move |x| x.cmpge(low).all() && x.cmple(high).all())
-        }
+    let builder = builder.self_contact(body.self_contact);
+    match body.pinned.clone() {
+        Some(regions) => builder.pinned(move |x| {
+            let within = |r: &file::Region| x.cmpge(r.min.into()).all() && x.cmple(r.max.into()).all();
+            regions.all().iter().any(within)
+        }),
         None => builder,
     }
 }
 
 impl Stage {
+    /// Makes a joint; names were checked with the file.
+    fn join(&mut self, joint: &file::Joint) -> Result<(), String> {
+        let named = |name: &str| self.rigid.iter().find(|(n, ..)| n == name).map(|(_, body, _)| *body);
+        let [Some(first), Some(second)] = joint.between.each_ref().map(|name| named(name.as_ref())) else {
+            return Ok(());
+        };
+        let anchor = |body: RigidBodyHandle| {
+            self.physics.bodies[body].position().inverse_transform_point(joint.anchor.into())
+        };
+        let (mut data, free): (GenericJoint, _) = match joint.kind {
+            JointKind::Fixed {} => (FixedJointBuilder::new().into(), None),
+            JointKind::Revolute { axis } => {
+                let axis = Vector::from(axis).normalize();
+                (RevoluteJointBuilder::new(axis).into(), Some(JointAxis::AngX))
+            }
+            JointKind::Prismatic { axis } => {
+                let axis = Vector::from(axis).normalize();
+                (PrismaticJointBuilder::new(axis).into(), Some(JointAxis::LinX))
+            }
+        };
+        data.set_local_anchor1(anchor(first));
+        data.set_local_anchor2(anchor(second));
+        if let (Some(motor), Some(axis)) = (joint.motor, free) {
+            data.set_motor_model(axis, MotorModel::ForceBased);
+            data.set_motor_velocity(axis, motor.velocity, motor.damping);
+            data.set_motor_max_force(axis, motor.max_force);
+        }
+        if joint.multibody {
+            let made = self.physics.multibody_joints.insert(first, second, data, true);
+            made.map(|_| ()).ok_or_else(|| {
+                format!("joint: \"{}\" is a link of a multibody already", joint.between[1].as_ref())
+            })
+        } else {
+            self.physics.impulse_joints.insert(first, second, data, true);
+            Ok(())
+        }
+    }
+
     /// The present value of a quantity of a named thing; names were checked with the file.
     pub fn measure(&self, quantity: Quantity, of: &str, on: Option<&str>) -> f64 {
         if let Some((_, handle)) = self.deformable.iter().find(|(name, _)| name == of) {
@@ -169,12 +209,19 @@ impl Stage {
             Quantity::Speed => body.max_speed(),
             Quantity::VolumeRatio => body.volume() / body.model().volume(),
             Quantity::Force => on.map_or(0.0, |on| self.force(handle, on)),
-            Quantity::Penetration => self.world.contacts_of(handle).map(|c| -c.gap).fold(0.0, f64::max),
+            Quantity::Penetration => {
+                let pairs = self.world.pair_contacts().iter();
+                let own = pairs.filter(|c| c.body1 == handle || c.body2 == handle).map(|c| -c.gap);
+                self.world.contacts_of(handle).map(|c| -c.gap).chain(own).fold(0.0, f64::max)
+            }
         }
     }
 
-    /// Vertical force of a named rigid body on a deformable one [N].
+    /// Vertical force of a named body on a deformable one [N].
     pub fn force(&self, body: DeformableBodyHandle, on: &str) -> f64 {
+        if let Some((_, other)) = self.deformable.iter().find(|(name, _)| name == on) {
+            return f64::from(self.world.pair_force(body, *other).y);
+        }
         let rigid = self.rigid.iter().find(|(name, ..)| name == on);
         rigid.map_or(0.0, |(_, _, collider)| f64::from(self.world.contact_force(body, *collider).y))
     }

@@ -15,6 +15,8 @@ pub struct Scene {
     #[serde(default)]
     pub rigid: Vec<Rigid>,
     #[serde(default)]
+    pub joint: Vec<Joint>,
+    #[serde(default)]
     pub deformable: Vec<Deformable>,
     #[serde(default)]
     pub probe: Vec<Probe>,
@@ -79,6 +81,38 @@ pub enum Kind {
     Kinematic,
 }
 
+/// Two rigid bodies held together.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Joint {
+    pub between: [Spanned<String>; 2],
+    pub kind: JointKind,
+    /// Where in the world it is at the start.
+    pub anchor: Vec3,
+    /// Whether the second body becomes a link of a multibody.
+    #[serde(default)]
+    pub multibody: bool,
+    pub motor: Option<Motor>,
+}
+
+/// The axis is that of both bodies' frames.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum JointKind {
+    Fixed {},
+    Revolute { axis: Vec3 },
+    Prismatic { axis: Vec3 },
+}
+
+/// Drives the free axis of a joint with no more than `max_force` [N, N m].
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Motor {
+    pub velocity: f32,
+    pub damping: f32,
+    pub max_force: f32,
+}
+
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape {
@@ -105,8 +139,10 @@ pub struct Deformable {
     pub linvel: Vec3,
     #[serde(default)]
     pub angvel: Vec3,
-    /// Vertices in this box of the world are pinned.
-    pub pinned: Option<Region>,
+    /// Vertices in this box of the world, or in one of several, are pinned.
+    pub pinned: Option<Regions>,
+    #[serde(default)]
+    pub self_contact: bool,
     #[serde(default)]
     pub solver: Solver,
 }
@@ -170,6 +206,22 @@ pub struct Region {
     pub max: Vec3,
 }
 
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged, expecting = "a box `{ min, max }` or a list of such")]
+pub enum Regions {
+    One(Region),
+    Several(Vec<Region>),
+}
+
+impl Regions {
+    pub fn all(&self) -> &[Region] {
+        match self {
+            Self::One(region) => std::slice::from_ref(region),
+            Self::Several(regions) => regions,
+        }
+    }
+}
+
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Solver {
@@ -212,7 +264,7 @@ pub struct Expect {
     pub quantity: Spanned<Quantity>,
     /// Body or probe.
     pub of: Spanned<String>,
-    /// The rigid body that touches it, for `force`.
+    /// The body that touches it, for `force`.
     pub on: Option<Spanned<String>>,
     /// Time [s]; the end if not given.
     pub at: Option<Spanned<f32>>,
@@ -298,6 +350,19 @@ fn check(scene: &Scene) -> Result<(), Mistake> {
         body.mass.as_ref().map_or(Ok(()), |m| positive(m, "mass"))?;
         body.density.as_ref().map_or(Ok(()), |d| positive(d, "density"))?;
     }
+    for joint in &scene.joint {
+        let bodies: Vec<&str> = scene.rigid.iter().map(|r| r.name.as_ref().as_str()).collect();
+        for name in &joint.between {
+            if !bodies.contains(&name.as_ref().as_str()) {
+                return Err(unknown(name, "between", "a rigid body", &bodies));
+            }
+        }
+        if let JointKind::Revolute { axis } | JointKind::Prismatic { axis } = joint.kind
+            && (axis.iter().all(|a| *a == 0.0) || !axis.iter().all(|a| a.is_finite()))
+        {
+            return Err((joint.between[0].span(), "`axis` of this joint must not be zero".into()));
+        }
+    }
     for body in &scene.rigid {
         let problem = shape_problem(body.shape.as_ref());
         problem.map_or(Ok(()), |what| Err((body.shape.span(), format!("`shape`: {what}"))))?;
@@ -338,16 +403,11 @@ fn check(scene: &Scene) -> Result<(), Mistake> {
             return Err((e.of.span(), "a probe has no `force`; name its body".into()));
         }
         match (&e.on, *e.quantity.as_ref() == Quantity::Force) {
-            (Some(on), true) if !rigid(on.as_ref()) => {
-                return Err(unknown(
-                    on,
-                    "on",
-                    "a rigid body",
-                    &scene.rigid.iter().map(|r| r.name.as_ref().as_str()).collect::<Vec<_>>(),
-                ));
+            (Some(on), true) if !rigid(on.as_ref()) && !deformable(on.as_ref()) => {
+                return Err(unknown(on, "on", "a body", &all));
             }
             (None, true) => {
-                return Err((e.quantity.span(), "`force` needs `on`, the rigid body that touches".into()));
+                return Err((e.quantity.span(), "`force` needs `on`, the body that touches".into()));
             }
             (Some(on), false) => return Err((on.span(), "`on` is for the quantity `force` only".into())),
             _ => {}

@@ -53,6 +53,10 @@ const WARM_STEPS: usize = 4;
 /// Forces are left as they are at the start if they are no worse than the tolerance times this. A
 /// hundred times more, and a symmetric stack of 1000:1 begins to sway.
 const AS_GOOD: f64 = 100.0;
+/// Error of a warm start, after its jump, from which on the ladder is climbed at once.
+const TOO_FAR: f64 = 0.2;
+/// Accuracy of the rungs below the last.
+const RUNG_TOLERANCE: f64 = 3.0e-3;
 /// Newton steps on a rung of the ladder.
 const RUNG_STEPS: usize = 40;
 /// Rungs tried when warm start and short ladder failed.
@@ -131,6 +135,9 @@ impl ConeSolver {
             solver.center.extend_from_slice(lambda);
             solver.Wz.clone_from(W_lambda);
             rungs.iter().all(|&(epsilon, steps)| {
+                // What is only a start for the next rung need not be more exact than that.
+                let relative = if epsilon > EPSILON { RUNG_TOLERANCE } else { tolerance.relative };
+                let tolerance = ConeTolerance { relative: relative.max(tolerance.relative), ..tolerance };
                 let done = solver.minimise(problem, epsilon, steps, tolerance, &mut work);
                 solver.center.clone_from(&solver.gamma);
                 solver.expected.clone_from(&solver.u);
@@ -138,7 +145,7 @@ impl ConeSolver {
             })
         };
         let done = climb(self, &[(EPSILON, WARM_STEPS)])
-            || climb(self, &[(1e-2, RUNG_STEPS), (EPSILON, RUNG_STEPS)])
+            || climb(self, &[(3e-2, RUNG_STEPS), (1e-3, RUNG_STEPS), (EPSILON, RUNG_STEPS)])
             || climb(self, &LONG_LADDER.map(|e| (e, RUNG_STEPS)));
         if !done {
             work.failures += 1;
@@ -189,7 +196,8 @@ impl ConeSolver {
         for step in 0..=RUNG_STEPS {
             let error = self.error(&z, tolerance);
             done = error <= tolerance.relative;
-            if done || step >= steps && error > NEARLY || !error.is_finite() {
+            let hopeless = steps == WARM_STEPS && step == 0 && error > TOO_FAR;
+            if done || hopeless || step >= steps && error > NEARLY || !error.is_finite() {
                 break;
             }
             work.newton_steps += 1;
