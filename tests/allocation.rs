@@ -100,6 +100,14 @@ fn a_box_on_a_cube_allocates_nothing() {
 }
 
 #[test]
+fn a_cube_on_a_cube_allocates_nothing() {
+    let cubes = vec![cube(1e6, Vector::Y * 0.2), cube(1e6, Vector::new(0.02, 0.6, 0.01))];
+    // On a thread of rayon's own: handing work to others takes memory for its queues.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(pool.install(|| allocations(cubes, &[], 180, 40)), 0);
+}
+
+#[test]
 fn a_swinging_beam_allocates_nothing() {
     assert_eq!(allocations(vec![beam().pinned(|x| x.x < -0.49)], &[], 120, 60), 0);
 }

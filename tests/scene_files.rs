@@ -50,8 +50,15 @@ fn shipped_scenes_parse() {
 #[test]
 fn wrong_files_are_answered_with_line_key_and_what_would_be_right() {
     // What is replaced by what; the line; what the answer has to say.
-    let table: [(&str, &str, usize, &[&str]); 21] = [
+    let table: [(&str, &str, usize, &[&str]); 23] = [
         ("duration = 1.0", "duration = -1.0", 2, &["duration", "positive"]),
+        (
+            "[[probe]]",
+            "[[joint]]\nbetween = [\"floor\", \"bar\"]\nkind = { fixed = {} }\nanchor = [0.0, 0.0, 0.0]\n[[probe]]",
+            15,
+            &["between", "bar", "floor"],
+        ),
+        ("[[probe]]", "pinned = 3\n[[probe]]", 14, &["pinned", "min", "list"]),
         ("duration = 1.0", "durations = 1.0", 2, &["durations", "duration"]),
         ("duration = 1.0", "duration = \"long\"", 2, &["duration", "string", "number"]),
         ("duration = 1.0", "duration = 1.0\ndt = 0.0", 3, &["dt", "positive"]),
