@@ -3,6 +3,7 @@
 mod common;
 use common::*;
 use foible3d::prelude::*;
+use parry3d::bounding_volume::BoundingVolume;
 use rapier3d::prelude::*;
 
 fn soft(half: [f32; 3], cells: [usize; 3], at: Vector) -> DeformableBodyBuilder {
@@ -301,4 +302,96 @@ fn a_curled_finger_lies_on_itself() {
         assert!(touching > 100 && worst < 6e-4);
         assert!((0.055..0.07).contains(&height));
     }
+}
+
+#[test]
+fn bodies_that_overlap_by_less_than_an_edge_come_apart() {
+    // Edges are of 0.09 m; deeper ones are neither drawn apart nor locked.
+    for overlap in [0.01f32, 0.03, 0.05] {
+        let mut physics = PhysicsWorld::new();
+        physics.gravity = Vector::ZERO;
+        let mut world = DeformableWorld::new();
+        let left = world.insert(soft([0.2; 3], [5; 3], Vector::X * (overlap / 2.0 - 0.2))).unwrap();
+        let right = soft([0.2; 3], [5; 3], Vector::new(0.2 - overlap / 2.0, 0.013, 0.007));
+        let right = world.insert(right.rotation(Vector::X * 0.1)).unwrap();
+        let mut fastest_ever = 0.0f64;
+        for _ in 0..180 {
+            world.step(&mut physics);
+            fastest_ever = fastest_ever.max(fastest(&world));
+        }
+        let boxes = [left, right].map(|b| world.bodies[b].aabb());
+        println!("{overlap} m: {fastest_ever:.2} m/s at the most");
+        assert!(!boxes[0].intersects(&boxes[1]), "still in one another");
+        // Overlaps are recovered at 1 m/s.
+        assert!(fastest_ever < 1.0);
+    }
+}
+
+#[test]
+fn a_body_that_hovers_beside_a_sleeping_one_lets_it_sleep() {
+    let (mut physics, _) = world_with_floor(1.0 / 60.0);
+    let mut world = DeformableWorld::new();
+    let sleeper = world.insert(soft([0.1; 3], [2; 3], Vector::Y * 0.1).can_sleep(true)).unwrap();
+    (0..90).for_each(|_| world.step(&mut physics));
+    assert!(world.bodies[sleeper].is_sleeping());
+    // Their boxes meet, their surfaces do not.
+    let above = soft([0.1; 3], [2; 3], Vector::new(0.21, 0.26, 0.0)).rotation(Vector::Z * 0.785);
+    world.insert(above.gravity_scale(0.0)).unwrap();
+    (0..30).for_each(|_| world.step(&mut physics));
+    assert!(world.bodies[sleeper].is_sleeping());
+}
+
+#[test]
+fn a_body_put_aside_takes_only_its_own_contacts_along() {
+    // The stiffest cannot be factored; the other two rest on one another.
+    for bad in 0..3 {
+        let (mut physics, _) = world_with_floor(1.0 / 60.0);
+        let mut world = DeformableWorld::new();
+        let cube = |k: usize, y: f32| {
+            let material = DeformableMaterial::new(if k == bad { 1e25 } else { 1e6 }, 0.3).friction(MU);
+            let at = if k == bad { Vector::new(0.19, y, 0.0) } else { Vector::Y * y };
+            soft([0.1; 3], [2; 3], at).material(material)
+        };
+        let mut heights = [0.1f32, 0.3].into_iter();
+        for k in 0..3 {
+            let y = if k == bad { 0.2 } else { heights.next().unwrap() };
+            world.insert(cube(k, y)).unwrap();
+        }
+        (0..60).for_each(|_| world.step(&mut physics));
+        assert_eq!(world.bodies.iter().filter(|(_, b)| b.is_quarantined()).count(), 1);
+        let heights: Vec<f64> = world
+            .bodies
+            .iter()
+            .filter(|(_, b)| !b.is_quarantined())
+            .map(|(_, b)| b.center_of_mass()[1])
+            .collect();
+        assert!((heights[0] - 0.1).abs() < 1e-3 && (heights[1] - 0.3).abs() < 3e-3, "{heights:?}");
+    }
+}
+
+#[test]
+fn what_hangs_together_wakes_in_the_same_step() {
+    // A pad, a rigid plate on it and a pad on that fall asleep; a third pad lands on top.
+    let (mut physics, _) = world_with_floor(1.0 / 60.0);
+    let mut world = DeformableWorld::new();
+    let pad = |y: f32| soft([0.1, 0.05, 0.1], [3, 2, 3], Vector::Y * y).can_sleep(true);
+    let lower = world.insert(pad(0.05)).unwrap();
+    let plate = RigidBodyBuilder::dynamic().translation(Vector::Y * 0.12);
+    let plate =
+        physics.insert(plate, ColliderBuilder::cuboid(0.1, 0.02, 0.1).density(1000.0).friction(0.5)).0;
+    let upper = world.insert(pad(0.19)).unwrap();
+    (0..120).for_each(|_| world.step(&mut physics));
+    assert!([lower, upper].iter().all(|b| world.bodies[*b].is_sleeping()));
+    world.insert(pad(0.5)).unwrap();
+    let mut woke = false;
+    for _ in 0..60 {
+        world.step(&mut physics);
+        let [a, b] = [lower, upper].map(|b| world.bodies[b].is_sleeping());
+        assert_eq!(a, b);
+        // A step without the lower pad would let the plate fall by 0.16 m/s.
+        let falls = -physics.bodies[plate].linvel().y;
+        assert!(falls < 0.12, "{falls}");
+        woke |= !a;
+    }
+    assert!(woke);
 }

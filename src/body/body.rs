@@ -307,7 +307,7 @@ impl DeformableBody {
     }
 
     /// Moves the body as it is, deformation and all, by a rigid motion; pins move along, velocities
-    /// turn, contacts are forgotten.
+    /// turn, its own contacts are forgotten.
     ///
     /// # Errors
     /// [`BodyError::NotFinite`].
@@ -507,29 +507,29 @@ impl DeformableBody {
         self.collision_groups
     }
 
-    /// Sets which colliders the body collides with.
+    /// Sets which colliders and deformable bodies the body collides with.
     pub fn set_collision_groups(&mut self, groups: InteractionGroups) {
         self.wake_up();
         self.collision_groups = groups;
     }
 
-    /// How friction combines with a collider's.
+    /// How friction combines with that of what it touches.
     pub fn friction_combine_rule(&self) -> CoefficientCombineRule {
         self.friction_combine_rule
     }
 
-    /// Sets how friction combines with a collider's.
+    /// Sets how friction combines with that of what it touches.
     pub fn set_friction_combine_rule(&mut self, rule: CoefficientCombineRule) {
         self.wake_up();
         self.friction_combine_rule = rule;
     }
 
-    /// How restitution combines with a collider's.
+    /// How restitution combines with that of what it touches.
     pub fn restitution_combine_rule(&self) -> CoefficientCombineRule {
         self.restitution_combine_rule
     }
 
-    /// Sets how restitution combines with a collider's.
+    /// Sets how restitution combines with that of what it touches.
     pub fn set_restitution_combine_rule(&mut self, rule: CoefficientCombineRule) {
         self.wake_up();
         self.restitution_combine_rule = rule;

@@ -22,8 +22,8 @@ pub(crate) struct Sleep {
 pub(crate) struct Surroundings {
     /// Key, part, and pose of the obstacles near it.
     pub obstacles: Vec<(u64, u32, Pose64)>,
-    /// Bodies that fell asleep with it, because they touched.
-    pub mates: Vec<DeformableBodyHandle>,
+    /// The next of the bodies that fell asleep together, because they touched, in a ring.
+    pub mate: Option<DeformableBodyHandle>,
     pub gravity: Vec3,
     /// Length of the step \[s\].
     pub dt: f64,

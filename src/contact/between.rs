@@ -40,7 +40,7 @@ pub(crate) struct SoftPair {
     pub restitution: f64,
 }
 
-/// Slots of the three kinds of rows: nodes of the first body, nodes of the second, edges.
+/// Slots of the three kinds of rows: nodes of the first body, of the second, edges.
 const FIRST_NODE: u32 = SOFT_SLOT;
 const SECOND_NODE: u32 = SOFT_SLOT + 1;
 const EDGES: u32 = SOFT_SLOT + 2;
@@ -58,12 +58,20 @@ const PARALLEL: f64 = 0.9;
 const DEEPEST: f64 = 1.0;
 /// Depth, in mean edges, of an overlap that another contact of the two has made impossible.
 const LATE: f64 = 2.0;
-/// Angle \[rad\] by which the direction between two edges may miss their normals.
-const ASKEW: f64 = 0.4;
-/// Nearer to the end of an edge than this part of it the node's own row serves.
-const AT_NODE: f64 = 1.0e-3;
-/// Sine of the angle below which edges count as parallel.
-const CROSSING: f64 = 0.1;
+/// What two edges that cross may miss.
+#[derive(Clone, Copy)]
+struct Room {
+    /// Part of an edge beyond its ends.
+    beside: f64,
+    /// Angle \[rad\] between the direction across them and the normals at them.
+    askew: f64,
+    /// Sine of the angle below which they count as parallel.
+    crossing: f64,
+}
+
+/// Within a thousandth of its end the node's own row serves.
+const NEW_EDGES: Room = Room { beside: -1.0e-3, askew: 0.4, crossing: 0.1 };
+const CARRYING_EDGES: Room = Room { beside: STILL_BESIDE, askew: 0.6, crossing: 0.05 };
 
 /// Finds contacts between deformables; holds the memory it needs between calls.
 #[derive(Default)]
@@ -133,7 +141,9 @@ impl BetweenDetector {
             }
         }
         if itself {
-            self.held[1 - finer] = self.held[finer].clone();
+            let [first, second] = &mut self.held;
+            let (from, to) = if finer == 0 { (first, second) } else { (second, first) };
+            to.clone_from(from);
         }
         self.cross(pair, surfaces, rows);
         self.drop_late(surfaces, first, rows);
@@ -204,7 +214,8 @@ impl BetweenDetector {
                 let carried = self.carried.binary_search(&key(t)).is_ok();
                 let room = if carried { STILL_BESIDE } else { BESIDE };
                 let touch = on_triangle(own, s, other, t as usize, room);
-                let Some(touch) = touch.filter(|touch| itself || !self.is_held(touch, other, 1 - side))
+                let Some(touch) =
+                    touch.filter(|touch| carried || itself || !self.is_held(touch, other, 1 - side))
                 else {
                     continue;
                 };
@@ -256,7 +267,7 @@ impl BetweenDetector {
             }
             let key = ContactKey { obstacle: b.key, part: eb, feature: ea, slot: EDGES };
             let carried = self.carried.binary_search(&key).is_ok();
-            let room = if carried { STILL_BESIDE } else { -AT_NODE };
+            let room = if carried { CARRYING_EDGES } else { NEW_EDGES };
             let Some(crossing) = crossing(a, ea as usize, b, eb as usize, room) else { continue };
             let holds = |side: usize| {
                 nodes[side].iter().all(|&n| {
@@ -264,7 +275,7 @@ impl BetweenDetector {
                     self.held[side][index].is_some_and(|held| held.dot(&crossing.normal).abs() > PARALLEL)
                 })
             };
-            if holds(0) || holds(1) {
+            if !carried && (holds(0) || holds(1)) {
                 continue;
             }
             let soft = |k: usize, body: usize| {
@@ -348,16 +359,15 @@ struct Crossing {
     closing: Closing,
 }
 
-/// Edges of two bodies that cross within the step, `room` being the part of an edge beyond its ends that
-/// counts too.
-fn crossing(a: &SoftSurface<'_>, ea: usize, b: &SoftSurface<'_>, eb: usize, room: f64) -> Option<Crossing> {
+/// Edges of two bodies that cross within the step, or nearly.
+fn crossing(a: &SoftSurface<'_>, ea: usize, b: &SoftSurface<'_>, eb: usize, room: Room) -> Option<Crossing> {
     let ends = |s: &SoftSurface<'_>, e: usize| s.model.surface.edges[e].map(|n| n as usize);
     let ([i, j], [k, l]) = (ends(a, ea), ends(b, eb));
     let (p, u) = (a.x[i], a.x[j] - a.x[i]);
     let (q, v) = (b.x[k], b.x[l] - b.x[k]);
     let across = u.cross(&v);
     let length = across.norm();
-    if !(length > CROSSING * u.norm() * v.norm()) {
+    if !(length > room.crossing * u.norm() * v.norm()) {
         return None;
     }
     let normal = across / length;
@@ -378,7 +388,10 @@ fn crossing(a: &SoftSurface<'_>, ea: usize, b: &SoftSurface<'_>, eb: usize, room
     let sign = if towards.dot(&normal) < 0.0 { -1.0 } else { 1.0 };
     let (normal, height) = (normal * sign, height * sign);
     let within = height < reach && height > -deepest;
-    if !within || !looks_along(a, ea, &outward_a, &-normal) || !looks_along(b, eb, &outward_b, &normal) {
+    if !within
+        || !looks_along(a, ea, &outward_a, &-normal, room.askew)
+        || !looks_along(b, eb, &outward_b, &normal, room.askew)
+    {
         return None;
     }
     let move_of = |s: &SoftSurface<'_>, ends: [usize; 2]| {
@@ -393,13 +406,13 @@ fn crossing(a: &SoftSurface<'_>, ea: usize, b: &SoftSurface<'_>, eb: usize, room
     let squared = length * length;
     let s = w.cross(&v).dot(&across) / squared;
     let t = w.cross(&u).dot(&across) / squared;
-    let inside = |t: f64| t > -room && t < 1.0 + room;
+    let inside = |t: f64| t > -room.beside && t < 1.0 + room.beside;
     (inside(s) && inside(t)).then_some(Crossing { places: [s, t], normal, gap: height, closing })
 }
 
 /// Whether a direction across an edge is between the normals of its two triangles, or nearly; of an edge that
 /// is no ridge, nearly their mean.
-fn looks_along(s: &SoftSurface<'_>, edge: usize, outward: &[Vec3; 2], direction: &Vec3) -> bool {
+fn looks_along(s: &SoftSurface<'_>, edge: usize, outward: &[Vec3; 2], direction: &Vec3, askew: f64) -> bool {
     let sum = outward[0] + outward[1];
     let length = sum.norm();
     if !(length > 0.0) {
@@ -413,7 +426,7 @@ fn looks_along(s: &SoftSurface<'_>, edge: usize, outward: &[Vec3; 2], direction:
     let highest = second.iter().map(|&n| outward[0].dot(&(s.x[n as usize] - i))).fold(0.0, f64::max);
     // The cosine of half the angle between the two normals, and of that and some more.
     let half = if -lowest > highest { (0.5 * length).min(1.0) } else { 1.0 };
-    let (sin, cos) = ASKEW.sin_cos();
+    let (sin, cos) = askew.sin_cos();
     direction.dot(&sum) >= length * (half * cos - (1.0 - half * half).sqrt() * sin)
 }
 

@@ -17,7 +17,7 @@ pub struct DeformableSurfacePoint {
     pub point: Vector,
     /// Outward unit normal of the surface.
     pub normal: Vector,
-    /// Vertices of the triangle that the point is on.
+    /// Vertices of the triangle that the point is on; inside a body, of the nearest one.
     pub vertices: [usize; 3],
     /// Their weights in it; they sum to one.
     pub weights: [f64; 3],
@@ -110,7 +110,7 @@ impl DeformableBodySet {
                 intersection_test(&pose, shape, &Pose::IDENTITY, &triangle)
                     .is_ok_and(|found| found.intersecting)
             };
-            triangles(body).any(|(_, triangle)| cuts(triangle)) || is_inside(body, pose.translation)
+            triangles(body).any(|(_, triangle)| cuts(triangle)) || lies_in(body, &pose, shape)
         };
         near.filter(move |(_, body)| meets(body)).map(|(handle, _)| handle)
     }
@@ -146,6 +146,19 @@ fn triangles(body: &DeformableBody) -> impl Iterator<Item = ([usize; 3], Triangl
     })
 }
 
+/// Whether a shape that does not cut the body's surface is inside of it, or one of its parts is.
+fn lies_in(body: &DeformableBody, pose: &Pose, shape: &dyn Shape) -> bool {
+    if let Some(compound) = shape.as_compound() {
+        return compound.shapes().iter().any(|(offset, part)| lies_in(body, &(*pose * *offset), &**part));
+    }
+    // A point of the shape: the farthest in some direction, or for what is not convex, the nearest to its middle.
+    let point = match shape.as_support_map() {
+        Some(convex) => convex.local_support_point(Vector::Y),
+        None => shape.project_local_point(shape.compute_local_aabb().center(), true).point,
+    };
+    is_inside(body, pose.transform_point(point))
+}
+
 /// Whether a point is in one of the body's elements.
 fn is_inside(body: &DeformableBody, point: Vector) -> bool {
     let p = from_real(point);
@@ -163,11 +176,33 @@ fn is_inside(body: &DeformableBody, point: Vector) -> bool {
 mod tests {
     use super::*;
     use crate::body::DeformableBodyBuilder;
-    use parry3d::shape::Ball;
+    use parry3d::shape::{Ball, SharedShape};
     use proptest::prelude::*;
 
     fn vector(size: f32) -> impl Strategy<Value = Vector> {
         [-size..size, -size..size, -size..size].prop_map(Vector::from)
+    }
+
+    #[test]
+    fn shapes_lie_in_a_body_wherever_their_origin_is() {
+        let mut bodies = DeformableBodySet::new();
+        let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [2; 3]);
+        let cube = bodies.insert(cube).unwrap();
+        let ball = |x: f32| (Pose::from_translation(Vector::X * x), SharedShape::ball(0.05));
+        let around = SharedShape::compound(vec![ball(-1.0), ball(1.0)]);
+        let hull: Vec<Vector> = (0..8)
+            .map(|i| {
+                Vector::new(1.0 + 0.1 * (i & 1) as f32, 0.1 * (i >> 1 & 1) as f32, 0.1 * (i >> 2) as f32)
+            })
+            .collect();
+        let hull = SharedShape::convex_hull(&hull).unwrap();
+        let met = |x: f32, shape: &SharedShape| {
+            let found: Vec<_> =
+                bodies.intersect_shape(Pose::from_translation(Vector::X * x), &**shape).collect();
+            found == [cube]
+        };
+        assert!(!met(0.0, &around) && met(-1.0, &around) && met(1.0, &around));
+        assert!(!met(0.0, &hull) && met(-1.05, &hull));
     }
 
     proptest! {

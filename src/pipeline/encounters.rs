@@ -6,6 +6,7 @@ use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet};
 use crate::contact::{BetweenDetector, Row, Side, SoftPair};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use rapier3d::dynamics::CoefficientCombineRule;
+use std::collections::HashMap;
 
 /// Pairs of bodies and memory for finding them.
 #[derive(Default)]
@@ -14,6 +15,8 @@ pub(super) struct Encounters {
     boxes: Vec<(Aabb, usize)>,
     /// Bodies that sleep beside others, as obstacles until they are woken.
     dormant: Vec<BodyWork>,
+    /// Those of the last step, for their memory.
+    memory: HashMap<DeformableBodyHandle, BodyWork>,
     /// The pairs of this step first, then memory for more.
     pairs: Vec<Encounter>,
     count: usize,
@@ -59,6 +62,12 @@ impl Encounters {
             let memory = &deformables[work(encounter.ends[0]).handle].state.contacts;
             encounter.rows.clear();
             encounter.detector.detect(&encounter.pair, [&a, &b], memory, &mut encounter.rows);
+            // Between pinned nodes there is nothing to solve for.
+            let held = |side: &Side| match side {
+                Side::Soft { body, .. } => work(*body).holds_all(side),
+                Side::Partner { .. } | Side::Turn { .. } => true,
+            };
+            encounter.rows.retain(|row| !row.sides.iter().all(held));
         });
         for encounter in self.pairs[..self.count].iter().filter(|pair| !pair.rows.is_empty()) {
             let sleeping = encounter.ends.iter().filter_map(|end| end.checked_sub(works.len()));
@@ -70,14 +79,10 @@ impl Encounters {
 
     /// Appends the contacts that were found last, with what bodies remember of them.
     pub fn take_rows(&self, works: &[BodyWork], deformables: &DeformableBodySet, rows: &mut Vec<Row>) {
-        for encounter in &self.pairs[..self.count] {
+        // Pairs with a body that sleeps on have no rows.
+        for encounter in self.pairs[..self.count].iter().filter(|pair| !pair.rows.is_empty()) {
             let body = &deformables[works[encounter.ends[0]].handle];
-            let held = |side: &Side| match side {
-                Side::Soft { body, .. } => works[*body].holds_all(side),
-                Side::Partner { .. } | Side::Turn { .. } => true,
-            };
-            let free = encounter.rows.iter().filter(|row| !row.sides.iter().all(held));
-            rows.extend(free.map(|row| {
+            rows.extend(encounter.rows.iter().map(|row| {
                 let mut row = row.clone();
                 if let Some(memory) = body.state.contact(&row.key) {
                     row.recall(memory);
@@ -96,16 +101,17 @@ impl Encounters {
     fn take_boxes(&mut self, works: &[BodyWork], deformables: &DeformableBodySet) {
         self.boxes.clear();
         self.boxes.extend(works.iter().enumerate().map(|(place, work)| (work.extent, place)));
-        self.dormant.clear();
+        self.memory.extend(self.dormant.drain(..).map(|work| (work.handle, work)));
         let Some(all) = self.boxes.iter().map(|(aabb, _)| *aabb).reduce(|a, b| a.merged(&b)) else { return };
         for (handle, body) in deformables.iter().filter(|(_, b)| b.is_enabled() && b.is_sleeping()) {
-            let mut work = BodyWork::new(handle);
-            if body.aabb().loosened(work.margin(body)).intersects(&all) {
+            if body.aabb().loosened(BodyWork::margin(body)).intersects(&all) {
+                let mut work = self.memory.remove(&handle).unwrap_or_else(|| BodyWork::new(handle));
                 work.survey(body);
                 self.boxes.push((work.extent, works.len() + self.dormant.len()));
                 self.dormant.push(work);
             }
         }
+        self.memory.clear();
     }
 
     /// Pairs of bodies whose boxes meet, by a sweep along x.

@@ -56,7 +56,7 @@ pub struct DeformableCounters {
     pub islands: usize,
     /// Colliders (or parts of compounds) read.
     pub obstacles: usize,
-    /// Body–collider pairs looked at closely.
+    /// Pairs of a body and a collider, and of two bodies, looked at closely.
     pub pairs: usize,
     /// Contacts found.
     pub contacts: usize,

@@ -211,10 +211,14 @@ impl DeformablePipeline {
                 break;
             }
             let first = self.works.len();
-            for handle in std::mem::take(&mut self.encounters.woken) {
-                deformables[handle].wake_up();
-                self.take_up(handle);
-                self.counters.sleeping -= 1;
+            self.encounters.woken.iter().for_each(|handle| deformables[*handle].wake_up());
+            self.sleeping.wake_together(deformables);
+            let awake = deformables.iter().filter(|(_, body)| body.is_enabled() && !body.is_sleeping());
+            for (handle, _) in awake {
+                if self.works[..first].iter().all(|work| work.handle != handle) {
+                    self.take_up(handle);
+                    self.counters.sleeping -= 1;
+                }
             }
             let (set, gravity) = (&*deformables, from_real(gravity));
             for_each(&mut self.works[first..], |work| work.predict(&set[work.handle], h, &gravity));
@@ -233,6 +237,7 @@ impl DeformablePipeline {
     fn prepare_factors(&mut self, deformables: &mut DeformableBodySet, h: f64, column_budget: usize) {
         self.factors.begin_step(column_budget);
         let (factors, counters) = (&mut self.factors, &mut self.counters);
+        let count = self.works.len();
         self.works.retain_mut(|work| {
             let (Some(problem), Some(body)) = (&work.problem, deformables.get_mut(work.handle)) else {
                 return false;
@@ -248,8 +253,15 @@ impl DeformablePipeline {
             true
         });
         // Rows name bodies by their places, which a body put aside has changed.
-        if self.works.iter().enumerate().any(|(place, work)| work.index != place) {
-            self.ties.clear();
+        if self.works.len() < count {
+            let mut places = vec![None; count];
+            self.works.iter().enumerate().for_each(|(place, work)| places[work.index] = Some(place));
+            self.ties.retain_mut(|row| {
+                row.sides.iter_mut().all(|side| match side {
+                    Side::Soft { body, .. } => places[*body].map(|place| *body = place).is_some(),
+                    Side::Partner { .. } | Side::Turn { .. } => true,
+                })
+            });
             for (place, work) in self.works.iter_mut().enumerate() {
                 work.move_to(place);
             }

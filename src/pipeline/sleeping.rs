@@ -33,7 +33,7 @@ impl Sleeping {
 
     /// Wakes bodies that are tied to one that is awake, or fell asleep touching one that is not asleep any
     /// more.
-    fn wake_together(&mut self, deformables: &mut DeformableBodySet) {
+    pub fn wake_together(&mut self, deformables: &mut DeformableBodySet) {
         loop {
             self.wake.clear();
             for (_, attachment) in deformables.attachments().filter(|(_, a)| !a.is_broken()) {
@@ -46,7 +46,7 @@ impl Sleeping {
             for (handle, body) in deformables.iter() {
                 let Some(around) = &body.state.sleep.surroundings else { continue };
                 let sleeps = |mate| deformables.get(mate).is_some_and(|b| b.is_enabled() && b.is_sleeping());
-                if !around.mates.iter().all(|mate| sleeps(*mate)) {
+                if !around.mate.is_none_or(sleeps) {
                     self.wake.push(handle);
                 }
             }
@@ -134,11 +134,11 @@ impl Sleeping {
                 self.rigid.push(handle);
             }
         }
-        for handle in handles {
+        for (k, handle) in handles.iter().enumerate() {
             let Some(body) = deformables.get_mut(*handle) else { continue };
             self.look_around(body, scene, candidates, gravity, dt);
-            self.now.mates.clear();
-            self.now.mates.extend(handles.iter().copied().filter(|mate| mate != handle));
+            let mate = handles[(k + 1) % handles.len()];
+            self.now.mate = (mate != *handle).then_some(mate);
             body.fall_asleep(self.now.clone());
         }
     }

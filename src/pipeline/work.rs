@@ -53,7 +53,7 @@ impl BodyWork {
     }
 
     /// Distance within which a body looks for contacts even without motion \[m\].
-    pub fn margin(&self, body: &DeformableBody) -> f32 {
+    pub fn margin(body: &DeformableBody) -> f32 {
         (STATIC_MARGIN * body.model.surface.mean_edge) as f32
     }
 
@@ -68,7 +68,7 @@ impl BodyWork {
     pub fn grow_tree(&mut self, body: &DeformableBody) {
         if self.in_company {
             let target = self.problem.as_ref().map_or(&body.state.x, |problem| &problem.target);
-            self.tree.update(&body.model, &body.state.x, target, self.margin(body).into());
+            self.tree.update(&body.model, &body.state.x, target, Self::margin(body).into());
         }
     }
 
