@@ -8,6 +8,7 @@
 //! What carried in the last step is looked at again, and given more room: on the ridge between two triangles
 //! each pushes the node onto the other, and with one of them at a time the two would take turns for ever.
 
+use super::crossing::{CARRYING_EDGES, NEW_EDGES, crossing};
 use super::row::{Law, Row, Side};
 use super::surface_tree::SurfaceTree;
 use super::triangle_rows::barycentric;
@@ -47,31 +48,17 @@ const EDGES: u32 = SOFT_SLOT + 2;
 
 /// Cosine beyond which two surfaces face one another.
 const FACING: f64 = -0.1;
-/// By how much weights and places on edges may miss, at first and where contact was.
+/// By how much weights may miss a triangle, at first and where contact was.
 const BESIDE: f64 = 0.02;
-const STILL_BESIDE: f64 = 0.3;
+pub(super) const STILL_BESIDE: f64 = 0.3;
 /// Cosine beyond which two triangles of one surface are one face.
 const COPLANAR: f64 = 0.9999;
 /// Cosine beyond which two rows push the same way.
 const PARALLEL: f64 = 0.9;
 /// Depth, in mean edges, beyond which an overlap is left to come apart by itself.
-const DEEPEST: f64 = 1.0;
+pub(super) const DEEPEST: f64 = 1.0;
 /// Depth, in mean edges, of an overlap that another contact of the two has made impossible.
 const LATE: f64 = 2.0;
-/// What two edges that cross may miss.
-#[derive(Clone, Copy)]
-struct Room {
-    /// Part of an edge beyond its ends.
-    beside: f64,
-    /// Angle \[rad\] between the direction across them and the normals at them.
-    askew: f64,
-    /// Sine of the angle below which they count as parallel.
-    crossing: f64,
-}
-
-/// Within a thousandth of its end the node's own row serves.
-const NEW_EDGES: Room = Room { beside: -1.0e-3, askew: 0.4, crossing: 0.1 };
-const CARRYING_EDGES: Room = Room { beside: STILL_BESIDE, askew: 0.6, crossing: 0.05 };
 
 /// Finds contacts between deformables; holds the memory it needs between calls.
 #[derive(Default)]
@@ -90,11 +77,11 @@ pub(crate) struct BetweenDetector {
 
 /// How a gap closes without contact.
 #[derive(Clone, Copy)]
-struct Closing {
+pub(super) struct Closing {
     /// Part of the step: zero if the gap is closed already or opens.
-    when: f64,
+    pub when: f64,
     /// \[m\] in the whole step.
-    distance: f64,
+    pub distance: f64,
 }
 
 /// A node on a triangle.
@@ -290,7 +277,7 @@ impl BetweenDetector {
 }
 
 impl Closing {
-    fn new(gap: f64, distance: f64) -> Self {
+    pub fn new(gap: f64, distance: f64) -> Self {
         let when = if gap > 0.0 && distance > 0.0 { (gap / distance).min(1.0) } else { 0.0 };
         Self { when, distance }
     }
@@ -349,87 +336,6 @@ fn on_triangle(
     Some(Touch { triangle: t, weights, normal, gap, miss, closing })
 }
 
-/// Two edges across one another.
-struct Crossing {
-    /// Places on the two edges, 0 at their first nodes.
-    places: [f64; 2],
-    /// From the second body to the first.
-    normal: Vec3,
-    gap: f64,
-    closing: Closing,
-}
-
-/// Edges of two bodies that cross within the step, or nearly.
-fn crossing(a: &SoftSurface<'_>, ea: usize, b: &SoftSurface<'_>, eb: usize, room: Room) -> Option<Crossing> {
-    let ends = |s: &SoftSurface<'_>, e: usize| s.model.surface.edges[e].map(|n| n as usize);
-    let ([i, j], [k, l]) = (ends(a, ea), ends(b, eb));
-    let (p, u) = (a.x[i], a.x[j] - a.x[i]);
-    let (q, v) = (b.x[k], b.x[l] - b.x[k]);
-    let across = u.cross(&v);
-    let length = across.norm();
-    if !(length > room.crossing * u.norm() * v.norm()) {
-        return None;
-    }
-    let normal = across / length;
-    let reach_of = |s: &SoftSurface<'_>, ends: [usize; 2]| {
-        ends.map(|n| s.reach[s.model.surface.index_of_node[n] as usize]).into_iter().fold(0.0, f64::max)
-    };
-    let reach = reach_of(a, [i, j]) + reach_of(b, [k, l]);
-    let deepest = DEEPEST * a.model.surface.mean_edge.min(b.model.surface.mean_edge);
-    let height = normal.dot(&(p - q));
-    if !(height.abs() < reach.max(deepest)) {
-        return None;
-    }
-    let faces =
-        |s: &SoftSurface<'_>, e: usize| s.model.surface.edge_triangles[e].map(|t| s.faces[t as usize]);
-    let [outward_a, outward_b] = [faces(a, ea), faces(b, eb)];
-    // From b to a: into a, out of b.
-    let towards = outward_b[0] + outward_b[1] - outward_a[0] - outward_a[1];
-    let sign = if towards.dot(&normal) < 0.0 { -1.0 } else { 1.0 };
-    let (normal, height) = (normal * sign, height * sign);
-    let within = height < reach && height > -deepest;
-    if !within
-        || !looks_along(a, ea, &outward_a, &-normal, room.askew)
-        || !looks_along(b, eb, &outward_b, &normal, room.askew)
-    {
-        return None;
-    }
-    let move_of = |s: &SoftSurface<'_>, ends: [usize; 2]| {
-        (s.target[ends[0]] - s.x[ends[0]] + s.target[ends[1]] - s.x[ends[1]]) * 0.5
-    };
-    let way = move_of(a, [i, j]) - move_of(b, [k, l]);
-    let closing = -normal.dot(&way);
-    let closing = Closing::new(height, closing);
-    let when = closing.when;
-    // In the plane of both: p + s u = q + t v.
-    let w = q - p - way * when;
-    let squared = length * length;
-    let s = w.cross(&v).dot(&across) / squared;
-    let t = w.cross(&u).dot(&across) / squared;
-    let inside = |t: f64| t > -room.beside && t < 1.0 + room.beside;
-    (inside(s) && inside(t)).then_some(Crossing { places: [s, t], normal, gap: height, closing })
-}
-
-/// Whether a direction across an edge is between the normals of its two triangles, or nearly; of an edge that
-/// is no ridge, nearly their mean.
-fn looks_along(s: &SoftSurface<'_>, edge: usize, outward: &[Vec3; 2], direction: &Vec3, askew: f64) -> bool {
-    let sum = outward[0] + outward[1];
-    let length = sum.norm();
-    if !(length > 0.0) {
-        return false;
-    }
-    let surface = &s.model.surface;
-    let [i, _] = surface.edges[edge].map(|n| s.x[n as usize]);
-    // The second triangle's third corner is below the first one's plane at a ridge.
-    let second = surface.triangles[surface.edge_triangles[edge][1] as usize];
-    let lowest = second.iter().map(|&n| outward[0].dot(&(s.x[n as usize] - i))).fold(0.0, f64::min);
-    let highest = second.iter().map(|&n| outward[0].dot(&(s.x[n as usize] - i))).fold(0.0, f64::max);
-    // The cosine of half the angle between the two normals, and of that and some more.
-    let half = if -lowest > highest { (0.5 * length).min(1.0) } else { 1.0 };
-    let (sin, cos) = askew.sin_cos();
-    direction.dot(&sum) >= length * (half * cos - (1.0 - half * half).sqrt() * sin)
-}
-
 /// Whether a surface node and a triangle of the same body are too near in the mesh to touch.
 fn are_neighbours(s: &SoftSurface<'_>, node: usize, triangle: usize) -> bool {
     let node = s.model.surface.nodes[node];
@@ -441,4 +347,73 @@ fn are_neighbours(s: &SoftSurface<'_>, node: usize, triangle: usize) -> bool {
 fn near_in_mesh(model: &DeformableModel, a: u32, b: u32) -> bool {
     let [of_a, of_b] = [a, b].map(|n| &model.adjacency[n as usize]);
     a == b || of_a.binary_search(&b).is_ok() || of_a.iter().any(|n| of_b.binary_search(n).is_ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{rotation_from_vector, to_real};
+    use crate::mesh::TetMesh;
+    use parry3d::math::Pose;
+    use parry3d::query::{PointQuery, distance};
+    use parry3d::shape::{Segment, Triangle};
+    use proptest::prelude::*;
+
+    fn vector(size: f64) -> impl Strategy<Value = Vec3> {
+        [-size..size, -size..size, -size..size].prop_map(Vec3::from)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn nodes_and_edges_that_are_near_are_listed_and_no_others(
+            shift in vector(0.35), turn in vector(3.0), margin in 0.005..0.05f64,
+        ) {
+            let model = DeformableModel::new(&TetMesh::cuboid([0.2, 0.15, 0.1], [3, 2, 2]).unwrap());
+            let moved: Vec<Vec3> =
+                model.rest.iter().map(|x| rotation_from_vector(&turn) * x + shift).collect();
+            let x = [&model.rest, &moved];
+            let trees = x.map(|x| {
+                let mut tree = SurfaceTree::default();
+                tree.update(&model, x, x, margin);
+                tree
+            });
+            let surface = |k: usize| SoftSurface {
+                body: k, key: k as u64, model: &model, x: x[k], target: x[k],
+                faces: &[], normals: &[], reach: &[], tree: &trees[k],
+            };
+            let mut detector = BetweenDetector::default();
+            detector.collect([&surface(0), &surface(1)], false);
+            let at = |k: usize, n: u32| to_real(&x[k][n as usize]);
+            let mesh = &model.surface;
+            // Two boxes with the margin around each meet within √3 of twice the margin along their
+            // diagonal; triangles reach no farther than their longest edge from a corner of theirs.
+            let longest = mesh.edges.iter().map(|e| (model.rest[e[0] as usize] - model.rest[e[1] as usize]).norm());
+            let far = (3.5 * margin + 2.0 * longest.fold(0.0, f64::max)) as f32;
+            for side in 0..2 {
+                let list = &detector.on_triangles[side];
+                prop_assert!(list.windows(2).all(|w| w[0] < w[1]), "once each");
+                for (s, &n) in mesh.nodes.iter().enumerate() {
+                    for (t, triangle) in mesh.triangles.iter().enumerate() {
+                        let [a, b, c] = triangle.map(|n| at(1 - side, n));
+                        let gap = Triangle::new(a, b, c).distance_to_local_point(at(side, n), true);
+                        let listed = list.binary_search(&(s as u32, t as u32)).is_ok();
+                        prop_assert!(listed || f64::from(gap) > 2.0 * margin);
+                        prop_assert!(!listed || gap < far);
+                    }
+                }
+            }
+            prop_assert!(detector.edges.windows(2).all(|w| w[0] < w[1]), "once each");
+            let segment = |k: usize, e: usize| Segment::new(at(k, mesh.edges[e][0]), at(k, mesh.edges[e][1]));
+            for ea in 0..mesh.edges.len() {
+                for eb in 0..mesh.edges.len() {
+                    let gap =
+                        distance(&Pose::IDENTITY, &segment(0, ea), &Pose::IDENTITY, &segment(1, eb)).unwrap().distance;
+                    let listed = detector.edges.binary_search(&(ea as u32, eb as u32)).is_ok();
+                    prop_assert!(listed || f64::from(gap) > 2.0 * margin);
+                    prop_assert!(!listed || gap < far);
+                }
+            }
+        }
+    }
 }

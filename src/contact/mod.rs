@@ -6,6 +6,7 @@
 mod between;
 mod candidates;
 pub(crate) mod cone;
+mod crossing;
 mod detection;
 mod obstacle;
 mod queries;
