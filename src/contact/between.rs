@@ -11,6 +11,7 @@
 use super::crossing::{CARRYING_EDGES, NEW_EDGES, crossing};
 use super::row::{Law, Row, Side};
 use super::surface_tree::SurfaceTree;
+use super::tangle::untangle;
 use super::triangle_rows::barycentric;
 use crate::body::{ContactKey, ContactMemory, DeformableModel, SOFT_SLOT};
 use crate::math::Vec3;
@@ -55,7 +56,7 @@ pub(super) const STILL_BESIDE: f64 = 0.3;
 const COPLANAR: f64 = 0.9999;
 /// Cosine beyond which two rows push the same way.
 const PARALLEL: f64 = 0.9;
-/// Depth, in mean edges, beyond which an overlap is left to come apart by itself.
+/// Depth, in mean edges, beyond which nothing is pushed out where it came in.
 pub(super) const DEEPEST: f64 = 1.0;
 /// Depth, in mean edges, of an overlap that another contact of the two has made impossible.
 const LATE: f64 = 2.0;
@@ -135,6 +136,9 @@ impl BetweenDetector {
         self.cross(pair, surfaces, rows);
         self.drop_late(surfaces, first, rows);
         rows[first..].sort_unstable_by_key(|row| row.key);
+        if !itself {
+            untangle(surfaces, a.tree.pairs(b.tree), rows);
+        }
     }
 
     /// Drops rows that would close only when the bodies have gone through one another somewhere else: what

@@ -14,6 +14,7 @@ mod rim_rows;
 mod row;
 mod surface_point;
 mod surface_tree;
+mod tangle;
 mod triangle_rows;
 
 pub(crate) use between::{BetweenDetector, SoftPair, SoftSurface};
