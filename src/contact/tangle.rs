@@ -74,7 +74,11 @@ fn is_deep(own: &SoftSurface<'_>, other: &SoftSurface<'_>) -> bool {
             w.iter().all(|w| *w >= 0.0) && w.sum() <= 1.0
         })
     };
-    own.model.surface.nodes.iter().map(|&n| own.x[n as usize]).any(|p| {
+    // What is that deep is as far inside of the other's box: next to nothing of bodies that rest on one another.
+    let low = other.x.iter().fold(other.x[0], |a, b| a.inf(b)).add_scalar(depth);
+    let high = other.x.iter().fold(other.x[0], |a, b| a.sup(b)).add_scalar(-depth);
+    let nodes = own.model.surface.nodes.iter().map(|&n| own.x[n as usize]);
+    nodes.filter(|p| (0..3).all(|k| p[k] > low[k] && p[k] < high[k])).any(|p| {
         let inside = other.model.tetrahedra.iter().any(|tet| holds(tet, &p));
         inside
             && (0..other.model.surface.triangles.len() as u32).all(|t| {
