@@ -4,6 +4,7 @@ use foible3d::prelude::*;
 use rapier3d::prelude::*;
 
 /// The middle one.
+// Not every benchmark uses both.
 #[allow(dead_code)]
 pub fn median(mut of: Vec<f64>) -> f64 {
     of.sort_by(f64::total_cmp);
@@ -11,6 +12,7 @@ pub fn median(mut of: Vec<f64>) -> f64 {
 }
 
 /// Rapier's soft body of a mesh at a pose: corotational, lumped masses of 1000 kg/m³, always awake.
+// Not every benchmark uses both.
 #[allow(dead_code)]
 pub fn rapier_body(mesh: &TetMesh, pose: Pose, youngs_modulus: f64, poisson_ratio: f64) -> SoftBodyBuilder {
     let place = |v: &[f64; 3]| pose.transform_point(Vector::from(v.map(|c| c as f32)));

@@ -64,6 +64,8 @@ const LATE: f64 = 2.0;
 /// Finds contacts between deformables; holds the memory it needs between calls.
 #[derive(Default)]
 pub(crate) struct BetweenDetector {
+    /// Triangles whose boxes meet.
+    pairs: Vec<(u32, u32)>,
     /// Surface nodes of one body and triangles of the other.
     on_triangles: [Vec<(u32, u32)>; 2],
     edges: Vec<(u32, u32)>,
@@ -137,7 +139,7 @@ impl BetweenDetector {
         self.drop_late(surfaces, first, rows);
         rows[first..].sort_unstable_by_key(|row| row.key);
         if !itself {
-            untangle(surfaces, a.tree.pairs(b.tree), rows);
+            untangle(surfaces, &self.pairs, rows);
         }
     }
 
@@ -166,7 +168,9 @@ impl BetweenDetector {
             |s: &SoftSurface<'_>, t: u32, n: u32| s.model.surface.node_triangle[index(s, n) as usize] == t;
         let on_edge =
             |s: &SoftSurface<'_>, t: u32, e: u32| s.model.surface.edge_triangles[e as usize][0] == t;
-        for (ta, tb) in a.tree.pairs(b.tree) {
+        self.pairs.clear();
+        self.pairs.extend(a.tree.pairs(b.tree));
+        for &(ta, tb) in &self.pairs {
             let (s, t) = (&a.model.surface, &b.model.surface);
             let own = s.triangles[ta as usize].iter().filter(|&&n| at_node(a, ta, n));
             of_a.extend(own.map(|&n| (index(a, n), tb)));

@@ -3,6 +3,7 @@
 use super::triangle_rows::barycentric;
 use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet};
 use crate::math::{Vec3, from_real, to_real};
+use crate::mesh::tetrahedron_holds;
 use parry3d::bounding_volume::BoundingVolume;
 use parry3d::math::{Pose, Vector};
 use parry3d::query::{PointQuery, Ray, RayCast, intersection_test};
@@ -163,13 +164,11 @@ fn lies_in(body: &DeformableBody, pose: &Pose, shape: &dyn Shape) -> bool {
 fn is_inside(body: &DeformableBody, point: Vector) -> bool {
     let p = from_real(point);
     body.aabb().contains_local_point(point)
-        && body.model.tetrahedra.iter().any(|tet| {
-            let [a, b, c, d] = tet.map(|n| body.state.x[n as usize]);
-            let edges = crate::math::Mat3::from_columns(&[b - a, c - a, d - a]);
-            let Some(inverse) = edges.try_inverse() else { return false };
-            let w = inverse * (p - a);
-            w.iter().all(|w| *w >= 0.0) && w.sum() <= 1.0
-        })
+        && body
+            .model
+            .tetrahedra
+            .iter()
+            .any(|tet| tetrahedron_holds(&tet.map(|n| body.state.x[n as usize]), &p))
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@
 use super::between::SoftSurface;
 use super::row::{Row, Side};
 use crate::body::{ContactKey, SOFT_SLOT};
-use crate::math::{Mat3, Vec3, to_real};
+use crate::math::{Vec3, to_real};
+use crate::mesh::tetrahedron_holds;
 use parry3d::math::Pose;
 use parry3d::query::{PointQuery, intersection_test};
 use parry3d::shape::Triangle;
@@ -18,11 +19,7 @@ const CLEARLY: f64 = 0.1;
 
 /// Appends rows that draw apart what is tangled, as fast as overlaps are recovered, on triangles that go through one
 /// another; `pairs` are triangles whose boxes meet.
-pub(super) fn untangle(
-    [a, b]: [&SoftSurface<'_>; 2],
-    pairs: impl Iterator<Item = (u32, u32)>,
-    rows: &mut Vec<Row>,
-) {
+pub(super) fn untangle([a, b]: [&SoftSurface<'_>; 2], pairs: &[(u32, u32)], rows: &mut Vec<Row>) {
     let first = rows.len();
     let side = |s: &SoftSurface<'_>, t: u32| {
         let nodes = s.model.surface.triangles[t as usize];
@@ -30,7 +27,7 @@ pub(super) fn untangle(
     };
     let middle = |s: &SoftSurface<'_>| s.x.iter().sum::<Vec3>() / s.x.len() as f64;
     let mut apart = None;
-    for (ta, tb) in pairs.filter(|&(ta, tb)| go_through(a, ta, b, tb)) {
+    for (ta, tb) in pairs.iter().copied().filter(|&(ta, tb)| go_through(a, ta, b, tb)) {
         let apart = *apart.get_or_insert_with(|| {
             let is_deep = is_deep(a, b) || is_deep(b, a);
             // Bodies in the very same place part in any direction.
@@ -66,14 +63,7 @@ fn go_through(a: &SoftSurface<'_>, ta: u32, b: &SoftSurface<'_>, tb: u32) -> boo
 /// Whether a surface node of one body is deep in the other.
 fn is_deep(own: &SoftSurface<'_>, other: &SoftSurface<'_>) -> bool {
     let depth = DEEP * other.model.surface.mean_edge;
-    let holds = |tet: &[u32; 4], p: &Vec3| {
-        let [a, b, c, d] = tet.map(|n| other.x[n as usize]);
-        let inverse = Mat3::from_columns(&[b - a, c - a, d - a]).try_inverse();
-        inverse.is_some_and(|inverse| {
-            let w = inverse * (p - a);
-            w.iter().all(|w| *w >= 0.0) && w.sum() <= 1.0
-        })
-    };
+    let holds = |tet: &[u32; 4], p: &Vec3| tetrahedron_holds(&tet.map(|n| other.x[n as usize]), p);
     // What is that deep is as far inside of the other's box: next to nothing of bodies that rest on one another.
     let low = other.x.iter().fold(other.x[0], |a, b| a.inf(b)).add_scalar(depth);
     let high = other.x.iter().fold(other.x[0], |a, b| a.sup(b)).add_scalar(-depth);

@@ -12,8 +12,8 @@ mod reactions;
 mod ties;
 
 pub(crate) use closure::{Around, Closure, ClosureSource};
-pub(crate) use obstacles::{RapierScene, combined};
+pub(crate) use obstacles::{RapierScene, combined, combined_between};
 pub use parts::PhysicsParts;
-pub(crate) use parts::RapierSets;
+pub(crate) use parts::{RapierSets, packed};
 pub(crate) use reactions::Reactions;
 pub(crate) use ties::{attachment_of, tie_rows};

@@ -202,24 +202,32 @@ pub(crate) fn combined(body: &DeformableBody, collider: &Collider) -> Option<(f6
     if !solved || !body.collision_groups().test(groups) {
         return None;
     }
-    let material = collider.material();
+    let m = collider.material();
+    let rules = (m.friction_combine_rule, m.restitution_combine_rule);
+    Some(coefficients(body, (m.friction, m.restitution), rules))
+}
+
+/// Friction and restitution of two deformable bodies by rapier's rules.
+pub(crate) fn combined_between(body: &DeformableBody, other: &DeformableBody) -> (f64, f64) {
+    let m = other.material();
+    let rules = (other.friction_combine_rule(), other.restitution_combine_rule());
+    coefficients(body, (m.friction as f32, m.restitution as f32), rules)
+}
+
+/// Friction and restitution of a body with what has these two, and these rules for them.
+fn coefficients(
+    body: &DeformableBody,
+    (friction, restitution): (f32, f32),
+    (friction_rule, restitution_rule): (CoefficientCombineRule, CoefficientCombineRule),
+) -> (f64, f64) {
     let combine = |own: f64, other: f32, own_rule, other_rule| {
         f64::from(CoefficientCombineRule::combine(own as f32, other, own_rule, other_rule))
     };
-    let friction = combine(
-        body.material.friction,
-        material.friction,
-        body.friction_combine_rule(),
-        material.friction_combine_rule,
-    );
-    let restitution = combine(
-        body.material.restitution,
-        material.restitution,
-        body.restitution_combine_rule(),
-        material.restitution_combine_rule,
-    );
+    let m = body.material();
+    let friction = combine(m.friction, friction, body.friction_combine_rule(), friction_rule);
+    let restitution = combine(m.restitution, restitution, body.restitution_combine_rule(), restitution_rule);
     // Beyond this no slope is left to slide on; infinity times zero would be no number.
-    Some((friction.clamp(0.0, 1e4), restitution.clamp(0.0, 1.0)))
+    (friction.clamp(0.0, 1e4), restitution.clamp(0.0, 1.0))
 }
 
 fn partner_of(

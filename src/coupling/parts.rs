@@ -61,7 +61,7 @@ pub(crate) struct RapierSets<'a> {
 }
 
 /// A handle's slot and generation as one number.
-pub(super) fn packed((index, generation): (u32, u32)) -> u64 {
+pub(crate) fn packed((index, generation): (u32, u32)) -> u64 {
     u64::from(index) << 32 | u64::from(generation)
 }
 

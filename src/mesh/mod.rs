@@ -12,5 +12,5 @@ mod tet_mesh;
 
 pub(crate) use ordering::{node_adjacency, sweep_order};
 pub(crate) use surface::Surface;
-pub(crate) use tet_mesh::signed_volume;
 pub use tet_mesh::{MeshError, TetMesh};
+pub(crate) use tet_mesh::{signed_volume, tetrahedron_holds};

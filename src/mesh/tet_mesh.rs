@@ -1,7 +1,7 @@
 //! A tetrahedral mesh that is valid by construction.
 
 use super::surface::{EdgeUse, boundary_triangles, edge_uses};
-use crate::math::Vec3;
+use crate::math::{Mat3, Vec3};
 use thiserror::Error;
 
 /// Relative volume (volume over cubed longest edge) below which a tetrahedron counts as flat; a
@@ -232,6 +232,15 @@ fn check_volume(tet: usize, p: [Vec3; 4]) -> Result<f64, MeshError> {
 /// Signed volume of a tetrahedron \[m³\].
 pub(crate) fn signed_volume(p: &[Vec3; 4]) -> f64 {
     (p[1] - p[0]).cross(&(p[2] - p[0])).dot(&(p[3] - p[0])) / 6.0
+}
+
+/// Whether a point is in a tetrahedron; in none without volume.
+pub(crate) fn tetrahedron_holds([a, b, c, d]: &[Vec3; 4], p: &Vec3) -> bool {
+    let inverse = Mat3::from_columns(&[b - a, c - a, d - a]).try_inverse();
+    inverse.is_some_and(|inverse| {
+        let w = inverse * (p - a);
+        w.iter().all(|w| *w >= 0.0) && w.sum() <= 1.0
+    })
 }
 
 fn check_surface(tetrahedra: &[[u32; 4]]) -> Result<(), MeshError> {

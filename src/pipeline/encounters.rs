@@ -4,8 +4,8 @@ use super::threads::for_each;
 use super::work::BodyWork;
 use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet};
 use crate::contact::{BetweenDetector, Row, Side, SoftPair};
+use crate::coupling::combined_between;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
-use rapier3d::dynamics::CoefficientCombineRule;
 use std::collections::HashMap;
 
 /// Pairs of bodies and memory for finding them.
@@ -162,14 +162,7 @@ impl Encounters {
     }
 }
 
-/// Friction and restitution of two bodies by rapier's rules.
 fn pair_of(a: &DeformableBody, b: &DeformableBody) -> SoftPair {
-    let combine = |one: f64, other: f64, rule, other_rule| {
-        f64::from(CoefficientCombineRule::combine(one as f32, other as f32, rule, other_rule))
-    };
-    let (m, n) = (a.material(), b.material());
-    let friction = combine(m.friction, n.friction, a.friction_combine_rule(), b.friction_combine_rule());
-    let restitution =
-        combine(m.restitution, n.restitution, a.restitution_combine_rule(), b.restitution_combine_rule());
-    SoftPair { friction: friction.clamp(0.0, 1e4), restitution: restitution.clamp(0.0, 1.0) }
+    let (friction, restitution) = combined_between(a, b);
+    SoftPair { friction, restitution }
 }

@@ -2,7 +2,7 @@
 
 use crate::body::{ContactMemory, DeformableBody, DeformableBodyHandle, DeformableState, is_number};
 use crate::contact::{Candidates, Detector, Pair, Row, STATIC_MARGIN, Side, SoftSurface, SurfaceTree};
-use crate::coupling::{RapierScene, RapierSets, combined};
+use crate::coupling::{RapierScene, RapierSets, combined, packed};
 use crate::math::Vec3;
 use crate::solver::{BodyProblem, FactorId, Island};
 use parry3d::bounding_volume::Aabb;
@@ -74,10 +74,9 @@ impl BodyWork {
 
     /// The surface over the step, of the body at `place` of the step's list.
     pub fn surface<'a>(&'a self, place: usize, body: &'a DeformableBody) -> SoftSurface<'a> {
-        let (slot, generation) = self.handle.into_raw_parts();
         SoftSurface {
             body: place,
-            key: u64::from(generation) << 32 | u64::from(slot),
+            key: packed(self.handle.into_raw_parts()),
             model: &body.model,
             x: &body.state.x,
             target: self.problem.as_ref().map_or(&body.state.x, |problem| &problem.target),
