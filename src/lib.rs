@@ -47,14 +47,14 @@ mod pipeline;
 pub use body::{
     Acceleration, AttachTo, BodyError, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
     DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableModel, DeformableState,
-    FactorPrecision, Frames, Pin, SolverSettings, SystemMatrix,
+    FactorPrecision, Fidelity, Frames, Pin, Solver, SolverSettings, SystemMatrix,
 };
 pub use contact::DeformableSurfacePoint;
 pub use coupling::PhysicsParts;
 pub use energy::Elasticity;
 pub use error::{DeformableBodyError, HandleError};
 pub use material::{DeformableMaterial, MaterialError};
-pub use mesh::{MeshError, TetMesh};
+pub use mesh::{MeshError, Structure, TetMesh};
 pub use pipeline::{
     DeformableContact, DeformableCounters, DeformablePairContact, DeformableParameters, DeformablePipeline,
     DeformableWorld, JointForce, JointRole, RigidContact, SolvedJoint,
@@ -67,8 +67,8 @@ pub mod prelude {
         DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
         DeformableContact, DeformableCounters, DeformableMaterial, DeformableModel, DeformablePairContact,
         DeformableParameters, DeformablePipeline, DeformableSurfacePoint, DeformableWorld, Elasticity,
-        FactorPrecision, Frames, JointForce, JointRole, PhysicsParts, RigidContact, SolvedJoint,
-        SolverSettings, SystemMatrix, TetMesh,
+        FactorPrecision, Fidelity, Frames, JointForce, JointRole, PhysicsParts, RigidContact, SolvedJoint,
+        Solver, SolverSettings, Structure, SystemMatrix, TetMesh,
     };
 }
 

@@ -1,6 +1,7 @@
 //! What a body is made of, in SI units.
 
 use crate::energy::Elasticity;
+use crate::energy::strain_limit::STIFFENING;
 use thiserror::Error;
 
 /// What is wrong with a material.
@@ -43,8 +44,12 @@ pub struct DeformableMaterial {
     /// Stiffness-proportional damping β \[s\]: stress `β` times the co-rotated strain rate times the
     /// stiffness. Rotation is not damped.
     pub stiffness_damping: f64,
-    /// The elastic energy.
+    /// The elastic energy of tetrahedra. Triangles of cloth, rods and springs have their own.
     pub elasticity: Elasticity,
+    /// Least and largest principal stretch [–]: beyond, the material is stiffer by twenty times.
+    pub strain_limits: Option<[f64; 2]>,
+    /// Young's modulus of muscle fibres along their direction \[Pa\], of bodies that have such.
+    pub fibre_modulus: f64,
 }
 
 /// Lamé parameters μ, λ \[Pa\].
@@ -67,6 +72,8 @@ impl DeformableMaterial {
             mass_damping: 0.0,
             stiffness_damping: 0.0,
             elasticity: Elasticity::default(),
+            strain_limits: None,
+            fibre_modulus: 0.0,
         }
     }
 
@@ -106,6 +113,19 @@ impl DeformableMaterial {
         self
     }
 
+    /// Limits the principal stretches, below and above one: cloth that gives way easily up to some
+    /// per cent and hardly any more.
+    pub fn strain_limits(mut self, least: f64, largest: f64) -> Self {
+        self.strain_limits = Some([least, largest]);
+        self
+    }
+
+    /// Sets Young's modulus of muscle fibres \[Pa\].
+    pub fn fibre_modulus(mut self, fibre_modulus: f64) -> Self {
+        self.fibre_modulus = fibre_modulus;
+        self
+    }
+
     /// Checks every range.
     ///
     /// # Errors
@@ -126,13 +146,24 @@ impl DeformableMaterial {
         let e = self.restitution;
         check("restitution", e, "in [0, 1]", (0.0..=1.0).contains(&e))?;
         not_negative("mass damping", self.mass_damping)?;
-        not_negative("stiffness damping", self.stiffness_damping)
+        not_negative("stiffness damping", self.stiffness_damping)?;
+        not_negative("fibre modulus", self.fibre_modulus)?;
+        if let Some([least, largest]) = self.strain_limits {
+            check("least stretch", least, "in [0, 1)", (0.0..1.0).contains(&least))?;
+            check("largest stretch", largest, "above 1 and finite", largest.is_finite() && largest > 1.0)?;
+        }
+        Ok(())
     }
 
     /// μ = E/(2(1+ν)), λ = Eν/((1+ν)(1−2ν)).
     pub(crate) fn lame(&self) -> Lame {
         let (e, nu) = (self.youngs_modulus, self.poisson_ratio);
         Lame { mu: e / (2.0 * (1.0 + nu)), lambda: e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)) }
+    }
+
+    /// Weight of what is beyond the strain limits \[Pa\].
+    pub(crate) fn limit_weight(&self) -> f64 {
+        STIFFENING * self.youngs_modulus
     }
 }
 
@@ -154,6 +185,9 @@ mod tests {
             (good.restitution(1.1), "restitution"),
             (good.mass_damping(f64::INFINITY), "mass damping"),
             (good.stiffness_damping(-1e-9), "stiffness damping"),
+            (good.fibre_modulus(-1.0), "fibre modulus"),
+            (good.strain_limits(1.0, 1.1), "least stretch"),
+            (good.strain_limits(0.9, f64::NAN), "largest stretch"),
         ] {
             let error = material.validate().unwrap_err();
             assert_eq!(error.quantity, quantity);

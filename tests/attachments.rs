@@ -135,3 +135,46 @@ fn vertices_that_cannot_be_attached_are_named() {
     assert!(error(&[], &mut world).contains("empty"));
     assert_eq!(world.bodies.attachments().count(), 0);
 }
+
+#[test]
+fn cable_without_compliance_does_not_stretch_under_a_thousand_times_the_weight_and_pushes_nothing() {
+    // A block on three metres of cable, slack at first; then a thousand times its weight on it.
+    let mut physics = PhysicsWorld::new();
+    let mut world = DeformableWorld::new();
+    let block = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2; 3])
+        .material(DeformableMaterial::new(1e8, 0.3).mass_damping(0.2))
+        .can_sleep(false);
+    let block = world.insert(block).unwrap();
+    let top = at_rest_where(&world.bodies[block], |p| p[1] > 0.0999 && p[0] == 0.0 && p[2] == 0.0);
+    let cable = world.bodies.attach(block, &top, AttachTo::World).unwrap();
+    let anchor = [0.0, 0.1, 0.0];
+    world.bodies.attachment_mut(cable).unwrap().set_length(0.5);
+    let distance = |world: &DeformableWorld| {
+        let p = world.bodies[block].position(top[0]).unwrap();
+        (0..3).map(|k| (p[k] - anchor[k]).powi(2)).sum::<f64>().sqrt()
+    };
+    // Half a metre of free fall takes 0.32 s.
+    for _ in 0..15 {
+        world.step(&mut physics);
+        assert!(world.bodies.attachment(cable).unwrap().force().length() == 0.0);
+    }
+    assert!((distance(&world) - 0.5 * G * 0.25f64.powi(2)).abs() < 0.03);
+    let mut farthest = 0.0f64;
+    for _ in 0..600 {
+        world.step(&mut physics);
+        farthest = farthest.max(distance(&world));
+    }
+    let weight = world.bodies[block].mass() * G;
+    let force = f64::from(world.bodies.attachment(cable).unwrap().force().y);
+    println!("cable: farthest {farthest:.6} m of 0.5, force/weight {:.6}", force / weight);
+    assert!(farthest < 0.5 * 1.001 && (force / weight - 1.0).abs() < 1e-3);
+    let bottom = at_rest_where(&world.bodies[block], |p| p[1] < -0.0999);
+    world.bodies[block].add_force(&bottom, Vector::NEG_Y * (999.0 * weight) as f32).unwrap();
+    for _ in 0..600 {
+        world.step(&mut physics);
+        farthest = farthest.max(distance(&world));
+    }
+    let force = f64::from(world.bodies.attachment(cable).unwrap().force().y);
+    println!("loaded: farthest {farthest:.6} m, force/weight {:.3}", force / weight);
+    assert!(farthest < 0.5 * 1.001 && (force / weight / 1000.0 - 1.0).abs() < 1e-3);
+}

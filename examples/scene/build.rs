@@ -110,12 +110,12 @@ fn deformable(body: &file::Deformable, folder: &Path) -> DeformableBodyBuilder {
         },
         max_iterations: body.solver.max_iterations.unwrap_or(defaults.max_iterations),
         tolerance: body.solver.tolerance.unwrap_or(defaults.tolerance),
-        precision: defaults.precision,
         acceleration: match body.solver.lbfgs {
             Some(0) => Acceleration::None,
             Some(window) => Acceleration::Lbfgs { window },
             None => defaults.acceleration,
         },
+        ..defaults
     };
     let builder = builder
         .pose(pose(body.translation, body.rotation))

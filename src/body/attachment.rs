@@ -31,6 +31,7 @@ pub struct DeformableAttachment {
     pub(crate) nodes: Vec<u32>,
     pub(crate) anchors: Anchors,
     compliance: f64,
+    length: f64,
     break_force: f64,
     pub(crate) force: Vec3,
     pub(crate) broken: bool,
@@ -76,6 +77,18 @@ impl DeformableAttachment {
     /// Changes the compliance [m/N]; negative values and NaN are taken for zero.
     pub fn set_compliance(&mut self, compliance: f64) {
         self.compliance = compliance.max(0.0);
+        self.changed = true;
+    }
+
+    /// How far the vertices may go from their places \[m\]; zero ties them there.
+    pub fn length(&self) -> f64 {
+        self.length
+    }
+
+    /// Makes cables of the ties, of this length \[m\]: they hold the vertices within it and push nothing. Without
+    /// a compliance they do not stretch, whatever they carry. Negative values and NaN are taken for zero.
+    pub fn set_length(&mut self, length: f64) {
+        self.length = length.max(0.0);
         self.changed = true;
     }
 
@@ -171,6 +184,7 @@ impl DeformableBodySet {
             nodes,
             anchors,
             compliance: 0.0,
+            length: 0.0,
             break_force: f64::INFINITY,
             force: Vec3::zeros(),
             broken: false,

@@ -2,7 +2,7 @@
 
 use super::elastic;
 use super::model::DeformableModel;
-use super::settings::SolverSettings;
+use super::settings::{Acceleration, SolverSettings};
 use super::sleep::Sleep;
 use super::state::{ContactMemory, DeformableState};
 use crate::material::{DeformableMaterial, MaterialError};
@@ -94,6 +94,7 @@ pub struct DeformableBody {
     pub(crate) forces: Vec<Vec3>,
     pub(crate) report: StepReport,
     settings: SolverSettings,
+    pub(crate) activation: f64,
     gravity_scale: f64,
     enabled: bool,
     pub(super) can_sleep: bool,
@@ -122,6 +123,7 @@ impl DeformableBody {
             forces: Vec::new(),
             report: StepReport::default(),
             settings: SolverSettings::default(),
+            activation: 1.0,
             gravity_scale: 1.0,
             enabled: true,
             can_sleep: true,
@@ -203,7 +205,7 @@ impl DeformableBody {
         Aabb::from_points(self.state.x.iter().map(to_real))
     }
 
-    /// Current volume \[m³\].
+    /// Volume that the tetrahedra enclose now \[m³\]; sheets and rods enclose none.
     pub fn volume(&self) -> f64 {
         elastic::volume(&self.model, &self.state.x)
     }
@@ -254,7 +256,7 @@ impl DeformableBody {
         let mut unused = vec![Vec3::zeros(); self.state.x.len()];
         let undamped = elastic::StiffnessDamping::default();
         let frame = crate::math::Mat3::identity();
-        elastic::add_forces(&self.model, &self.material, &undamped, &self.state.x, &frame, &mut unused).energy
+        elastic::add_forces(&self.elements(), &undamped, &self.state.x, &frame, &mut unused).energy
     }
 
     /// Sets the velocity of all vertices [m/s].
@@ -456,10 +458,25 @@ impl DeformableBody {
         settings.max_iterations = settings.max_iterations.max(1);
         // NaN too becomes zero: iterate to the limit.
         settings.tolerance = settings.tolerance.max(0.0);
-        if let super::Acceleration::Lbfgs { window } = &mut settings.acceleration {
-            *window = (*window).clamp(1, 16);
+        match &mut settings.acceleration {
+            Acceleration::Lbfgs { window } | Acceleration::Anderson { window } => {
+                *window = (*window).clamp(1, 16);
+            }
+            Acceleration::Chebyshev { radius } => *radius = radius.max(0.0).min(0.9999),
+            Acceleration::None => {}
         }
         self.settings = settings;
+    }
+
+    /// Stretch that muscle fibres want to have [–]: one at rest, less when they contract.
+    pub fn activation(&self) -> f64 {
+        self.activation
+    }
+
+    /// Sets the stretch that muscle fibres want to have; brought into 0 to 10, one if it is no number.
+    pub fn set_activation(&mut self, stretch: f64) {
+        self.wake_up();
+        self.activation = if stretch.is_nan() { 1.0 } else { stretch.clamp(0.0, 10.0) };
     }
 
     /// Factor on gravity.
@@ -559,6 +576,10 @@ impl DeformableBody {
     }
 
     // ── For the other rooms of the crate ────────────────────────────────
+
+    pub(crate) fn elements(&self) -> elastic::Elements<'_> {
+        elastic::Elements { model: &self.model, material: &self.material, activation: self.activation }
+    }
 
     pub(crate) fn node_mass(&self, node: usize) -> f64 {
         self.material.density * self.model.node_volumes[node]

@@ -2,10 +2,10 @@
 
 use super::body::DeformableBody;
 use super::model::DeformableModel;
-use super::settings::SolverSettings;
+use super::settings::{Build, Fidelity, SolverSettings};
 use crate::error::DeformableBodyError;
 use crate::material::DeformableMaterial;
-use crate::mesh::{MeshError, TetMesh};
+use crate::mesh::{MeshError, Structure, TetMesh};
 use parry3d::shape::Shape;
 use rapier3d::dynamics::CoefficientCombineRule;
 use rapier3d::geometry::InteractionGroups;
@@ -54,6 +54,41 @@ impl DeformableBodyBuilder {
         Self::from_mesh(TetMesh::cuboid(half_extents.to_array().map(f64::from), cells))
     }
 
+    /// A sheet in the plane of x and z, of these half extents \[m\] and of `thickness` \[m\], cut into triangles as
+    /// [`Structure::rectangle`] says. As of all that is thin, its solver is given the [`Laplacian`](super::SystemMatrix::Laplacian); see
+    /// [`Solver::Newton`](super::Solver::Newton) for stiff ones.
+    ///
+    /// ```
+    /// use foible3d::prelude::*;
+    /// // A flag of cotton, half a millimetre.
+    /// let cotton = DeformableMaterial::new(5.0e6, 0.3).density(400.0).mass_damping(0.5);
+    /// let flag = DeformableBodyBuilder::cloth([0.6, 0.4], [24, 16], 5.0e-4).material(cotton);
+    /// let flag = flag.pinned(|x| x.x < -0.599).build()?;
+    /// assert!((flag.mass() - 400.0 * 1.2 * 0.8 * 5.0e-4).abs() < 1e-7);
+    /// # Ok::<(), DeformableBodyError>(())
+    /// ```
+    pub fn cloth(half_extents: [f32; 2], cells: [usize; 2], thickness: f32) -> Self {
+        let half_extents = half_extents.map(f64::from);
+        Self::from_structure(Structure::rectangle(half_extents, cells, thickness.into()))
+    }
+
+    /// A rope or rod along a polyline of `points` \[m\], of this `radius` \[m\]. It resists stretch and bending as
+    /// a round bar of the material, and no twist. Solved by [`Solver::Newton`](super::Solver::Newton): its matrix is a narrow band.
+    pub fn rope(points: &[Vector], radius: f32) -> Self {
+        let points: Vec<[f64; 3]> = points.iter().map(|p| p.to_array().map(f64::from)).collect();
+        Self::from_structure(Structure::rod(&points, radius.into()))
+    }
+
+    /// The edges of a mesh as a mass–spring network, see [`Structure::spring_network`].
+    pub fn spring_network(mesh: &TetMesh) -> Self {
+        Self::structure(&Structure::spring_network(mesh))
+    }
+
+    /// Any mix of tetrahedra, sheets, rods and springs.
+    pub fn structure(structure: &Structure) -> Self {
+        Self::from_structure(Ok(structure.clone()))
+    }
+
     /// A parry shape filled with tetrahedra of about `cell_size` \[m\], see [`TetMesh::fill_shape`].
     pub fn filled(shape: &dyn Shape, cell_size: f32) -> Self {
         Self::from_mesh(TetMesh::fill_shape(shape, cell_size))
@@ -79,11 +114,16 @@ impl DeformableBodyBuilder {
         Self::new(mesh.map(|mesh| Arc::new(DeformableModel::new(&mesh))))
     }
 
+    fn from_structure(structure: Result<Structure, MeshError>) -> Self {
+        Self::new(structure.and_then(|s| DeformableModel::from_structure(&s)).map(Arc::new))
+    }
+
     fn new(model: Result<Arc<DeformableModel>, MeshError>) -> Self {
+        let build = model.as_ref().map_or(Build::Solid, |m| m.build());
         Self {
             model,
             material: DeformableMaterial::new(1.0e6, 0.3),
-            settings: SolverSettings::default(),
+            settings: Fidelity::default().settings(build),
             pose: Pose::IDENTITY,
             linvel: Vector::ZERO,
             angvel: Vector::ZERO,
@@ -108,6 +148,12 @@ impl DeformableBodyBuilder {
     /// Sets the knobs of the solver.
     pub fn settings(mut self, settings: SolverSettings) -> Self {
         self.settings = settings;
+        self
+    }
+
+    /// Sets the knobs of the solver to those of a preset, for what the body is made of.
+    pub fn fidelity(mut self, fidelity: Fidelity) -> Self {
+        self.settings = fidelity.settings(self.model.as_ref().map_or(Build::Solid, |m| m.build()));
         self
     }
 

@@ -6,12 +6,23 @@
 //! Stiffness damping adds `β/h·V·(μ‖F − R′S_n‖² + λ/2·(tr(RᵀF) − tr S_n)²)` with the stretch
 //! `S_n = R_nᵀF_n` at the start of the step and R′ = polar(F S_n), so that spinning costs nothing.
 
-use super::model::{DeformableModel, ElementBlock};
+use super::elements::ElementBlock;
+use super::model::DeformableModel;
+use super::thin::{self, ThinDamping};
 use crate::energy::{ElementEnergy, with_energy};
 use crate::material::{DeformableMaterial, Lame};
 use crate::math::lanes::{LANES, Lane, LaneMat3, dot3};
 use crate::math::polar::{polar_rotation, polar_rotations};
 use crate::math::{Mat3, Vec3, vectorized};
+
+/// What the elastic energy of a body is made of.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Elements<'a> {
+    pub model: &'a DeformableModel,
+    pub material: &'a DeformableMaterial,
+    /// Stretch that muscle fibres want to have.
+    pub activation: f64,
+}
 
 /// Stiffness damping over one step.
 #[derive(Clone, Debug, Default)]
@@ -20,6 +31,7 @@ pub(crate) struct StiffnessDamping {
     ratio: f64,
     /// Stretch of each block at the start of the step; empty without damping.
     stretches: Vec<LaneMat3>,
+    thin: ThinDamping,
 }
 
 impl StiffnessDamping {
@@ -30,6 +42,7 @@ impl StiffnessDamping {
         if beta > 0.0 {
             push_stretches(model, x, &mut self.stretches);
         }
+        self.thin.begin(&model.triangles, &model.stencils, beta, x);
     }
 }
 
@@ -59,16 +72,20 @@ pub(crate) struct Elastic {
 /// Adds the elastic (and damping) forces \[N\] at positions `x` to `force`; `frame` is what the turn of
 /// the elements is measured against.
 pub(crate) fn add_forces(
-    model: &DeformableModel,
-    material: &DeformableMaterial,
+    elements: &Elements<'_>,
     damping: &StiffnessDamping,
     x: &[Vec3],
     frame: &Mat3,
     force: &mut [Vec3],
 ) -> Elastic {
-    with_energy!(material, energy => {
+    let Elements { model, material, .. } = elements;
+    let mut elastic = with_energy!(material, energy => {
         sum_elements(energy, model, material, damping, x, frame, force)
-    })
+    });
+    if !(model.triangles.is_empty() && model.stencils.is_empty()) {
+        elastic.energy += thin::add_forces(elements, &damping.thin, damping.ratio, x, force);
+    }
+    elastic
 }
 
 vectorized! {
@@ -269,7 +286,8 @@ mod tests {
 
     fn forces(material: &DeformableMaterial, damping: &StiffnessDamping, x: &[Vec3]) -> (f64, Vec<Vec3>) {
         let mut f = vec![Vec3::zeros(); x.len()];
-        let elastic = add_forces(&model(), material, damping, x, &Mat3::identity(), &mut f);
+        let elements = Elements { model: &model(), material, activation: 1.0 };
+        let elastic = add_forces(&elements, damping, x, &Mat3::identity(), &mut f);
         (elastic.energy, f)
     }
 
@@ -346,7 +364,8 @@ mod tests {
         for elasticity in [Elasticity::LinearCorotated, Elasticity::Projective] {
             let material = DeformableMaterial::new(1.0, 0.3).elasticity(elasticity);
             let mut f = vec![Vec3::zeros(); x.len()];
-            add_forces(&model, &material, &StiffnessDamping::default(), &x, &Mat3::identity(), &mut f);
+            let elements = Elements { model: &model, material: &material, activation: 1.0 };
+            add_forces(&elements, &StiffnessDamping::default(), &x, &Mat3::identity(), &mut f);
             for (X, f) in model.rest.iter().zip(&f) {
                 if X.iter().all(|c| c.abs() < 0.29) {
                     assert!(f.norm() < 1e-10, "{elasticity:?}: {f}");

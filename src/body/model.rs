@@ -1,8 +1,11 @@
-//! The constant part of a body: rest mesh, element gradients, surface, node order.
+//! The constant part of a body: rest mesh, elements, surface, node order.
 
-use crate::math::lanes::{LANES, Lane};
-use crate::math::{Mat3, Vec3};
-use crate::mesh::{Surface, TetMesh, node_adjacency, sweep_order};
+use super::elements::{ElementBlock, Stencil, TriangleElement};
+use super::settings::Build;
+use super::thin::ThinElements;
+use crate::math::Vec3;
+use crate::math::lanes::LANES;
+use crate::mesh::{MeshError, Structure, Surface, TetMesh, node_adjacency, sweep_order};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Everything about a body that its motion and its material do not change. Made once per mesh and
@@ -17,7 +20,13 @@ pub struct DeformableModel {
     pub(crate) tetrahedra: Vec<[u32; 4]>,
     /// The tetrahedra again, four at a time, as the element loops want them.
     pub(crate) blocks: Vec<ElementBlock>,
-    /// A quarter of the volume of the tetrahedra around each node \[m³\].
+    /// Triangles of sheets.
+    pub(crate) triangles: Vec<TriangleElement>,
+    /// What keeps lengths: springs, rods, hinges of sheets, muscle fibres.
+    pub(crate) stencils: Vec<Stencil>,
+    /// Distance of the surface from each node \[m\]: half the thickness of a sheet, the radius of a rod.
+    pub(crate) half_thickness: Vec<f64>,
+    /// Each node's share of the volume of the elements around it: a quarter of a tetrahedron's \[m³\].
     pub(crate) node_volumes: Vec<f64>,
     /// Nodes that share a tetrahedron with each node, ascending, itself left out.
     pub(crate) adjacency: Vec<Vec<u32>>,
@@ -31,54 +40,99 @@ pub struct DeformableModel {
     vertex_of_node: Vec<u32>,
 }
 
-/// Four tetrahedra side by side.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ElementBlock {
-    /// `corners[a][i]`: node at corner a of tetrahedron i.
-    pub corners: [[u32; LANES]; 4],
-    /// `gradients[a]`: gradient of the shape function of corner a + 1 [1/m]; corner 0 has minus
-    /// their sum. `F = Σ (x_a − x_0) gradients[a]ᵀ`.
-    pub gradients: [[Lane; 3]; 3],
-    /// Rest volumes \[m³\]; zero in the lanes that fill up the last block.
-    pub volumes: Lane,
-}
-
 static NEXT_ID: AtomicU64 = AtomicU64::new(1);
 
 impl DeformableModel {
     /// Prepares a mesh for simulation.
     pub fn new(mesh: &TetMesh) -> Self {
-        let at_rest: Vec<Vec3> = mesh.vertices().iter().map(|&v| v.into()).collect();
+        Self::of(&Structure::solid(mesh))
+    }
+
+    /// Prepares a structure for simulation: tetrahedra, sheets, rods and springs in any mix.
+    ///
+    /// # Errors
+    /// [`MeshError::UnusedVertex`] for a vertex without mass, [`MeshError::Empty`].
+    pub fn from_structure(structure: &Structure) -> Result<Self, MeshError> {
+        structure.check()?;
+        Ok(Self::of(structure))
+    }
+
+    /// The same with muscle fibres in its tetrahedra: `direction` tells their direction at a point of the rest
+    /// shape \[m\]; where that is zero or no number there are none. See
+    /// [`DeformableMaterial::fibre_modulus`](crate::DeformableMaterial::fibre_modulus).
+    pub fn with_fibres(mut self, direction: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
+        self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
+        for tet in &self.tetrahedra {
+            let middle = tet.iter().map(|&n| self.rest[n as usize]).sum::<Vec3>() / 4.0;
+            let along = Vec3::from(direction(middle.into()));
+            if let Some(along) = along.try_normalize(0.0).filter(|a| a.iter().all(|c| c.is_finite())) {
+                let block = ElementBlock::new(&[*tet], &self.rest);
+                let volume = crate::mesh::signed_volume(&tet.map(|n| self.rest[n as usize]));
+                self.stencils.push(Stencil::fibre(*tet, &block.shape_gradients(0), volume, &along));
+            }
+        }
+        self
+    }
+
+    /// Of a structure in which every vertex has mass.
+    fn of(structure: &Structure) -> Self {
+        let at_rest: Vec<Vec3> = structure.vertices.iter().map(|&v| v.into()).collect();
         let vertex_of_node = sweep_order(&at_rest);
         let mut node_of_vertex = vec![0; at_rest.len()];
         for (node, &vertex) in vertex_of_node.iter().enumerate() {
             node_of_vertex[vertex as usize] = node as u32;
         }
         let rest: Vec<Vec3> = vertex_of_node.iter().map(|&v| at_rest[v as usize]).collect();
-        let mut tetrahedra: Vec<[u32; 4]> =
-            mesh.tetrahedra().iter().map(|t| t.map(|v| node_of_vertex[v as usize])).collect();
+        let node = |v: u32| node_of_vertex[v as usize];
+        let mut tetrahedra: Vec<[u32; 4]> = structure.tetrahedra.iter().map(|t| t.map(node)).collect();
         // Neighbouring elements touch neighbouring memory.
         tetrahedra.sort_by_key(|t| t.iter().sum::<u32>());
         let mut node_volumes = vec![0.0; rest.len()];
+        let mut volume = 0.0;
         for tet in &tetrahedra {
-            let volume = crate::mesh::signed_volume(&tet.map(|n| rest[n as usize]));
-            tet.iter().for_each(|&n| node_volumes[n as usize] += volume / 4.0);
+            let own = crate::mesh::signed_volume(&tet.map(|n| rest[n as usize]));
+            tet.iter().for_each(|&n| node_volumes[n as usize] += own / 4.0);
+            volume += own;
         }
-        let surface = Surface::new(&tetrahedra, &rest);
+        let thin = ThinElements::new(structure, node, &tetrahedra, &rest, &mut node_volumes);
+        volume += thin.volume;
+        let sheets: Vec<[u32; 3]> = thin.triangles.iter().map(|t| t.nodes).collect();
+        let surface = Surface::new(&tetrahedra, &sheets, &thin.segments, &rest);
         let low = rest.iter().fold(rest[0], |a, b| a.inf(b));
         let high = rest.iter().fold(rest[0], |a, b| a.sup(b));
+        let solid: &[[u32; 4]] = if structure.is_network { &[] } else { &tetrahedra };
+        let thin_nodes = thin.triangles.iter().map(|t| &t.nodes[..]);
+        let thin_nodes = thin_nodes.chain(thin.stencils.iter().map(|s| &s.nodes[..]));
+        let adjacency = node_adjacency(tetrahedra.iter().map(|t| &t[..]).chain(thin_nodes), rest.len());
         Self {
             id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
-            blocks: tetrahedra.chunks(LANES).map(|c| ElementBlock::new(c, &rest)).collect(),
-            adjacency: node_adjacency(&tetrahedra, rest.len()),
-            volume: mesh.volume(),
+            blocks: solid.chunks(LANES).map(|c| ElementBlock::new(c, &rest)).collect(),
+            adjacency,
+            volume,
             size: (high - low).norm(),
             rest,
+            triangles: thin.triangles,
+            stencils: thin.stencils,
+            half_thickness: thin.half_thickness,
             tetrahedra,
             node_volumes,
             surface,
             node_of_vertex,
             vertex_of_node,
+        }
+    }
+
+    /// Whether it is a solid, altogether or in part.
+    pub fn is_solid(&self) -> bool {
+        !self.blocks.is_empty()
+    }
+
+    /// What it is made of.
+    pub(crate) fn build(&self) -> Build {
+        match (self.is_solid(), self.surface.triangles.is_empty()) {
+            (true, _) => Build::Solid,
+            (false, false) => Build::Sheet,
+            (false, true) => Build::Rope,
         }
     }
 
@@ -90,6 +144,12 @@ impl DeformableModel {
     /// Number of tetrahedra.
     pub fn tetrahedron_count(&self) -> usize {
         self.tetrahedra.len()
+    }
+
+    /// Number of elements of all kinds that have an energy.
+    pub(crate) fn element_count(&self) -> usize {
+        let solid = if self.is_solid() { self.tetrahedra.len() } else { 0 };
+        solid + self.triangles.len() + self.stencils.len()
     }
 
     /// Rest position of a vertex \[m\].
@@ -117,7 +177,9 @@ impl DeformableModel {
         size_of_val(&self.rest[..])
             + size_of_val(&self.tetrahedra[..])
             + size_of_val(&self.blocks[..])
-            + size_of_val(&self.node_volumes[..])
+            + size_of_val(&self.triangles[..])
+            + size_of_val(&self.stencils[..])
+            + 2 * size_of_val(&self.node_volumes[..])
             + self.adjacency.iter().map(|a| 24 + 4 * a.len()).sum::<usize>()
             + size_of_val(&self.surface.triangles[..]) * 2
             + size_of_val(&self.surface.edges[..])
@@ -137,38 +199,5 @@ impl DeformableModel {
     /// Nodes in the order of the user's vertices.
     pub(crate) fn nodes_by_vertex(&self) -> impl ExactSizeIterator<Item = usize> + '_ {
         self.node_of_vertex.iter().map(|&n| n as usize)
-    }
-}
-
-impl ElementBlock {
-    fn new(tetrahedra: &[[u32; 4]], rest: &[Vec3]) -> Self {
-        let mut block =
-            Self { corners: [[0; LANES]; 4], gradients: [[Lane::default(); 3]; 3], volumes: Lane::default() };
-        for i in 0..LANES {
-            // The last block is filled up with copies of its last element, without volume.
-            let tet = tetrahedra[i.min(tetrahedra.len() - 1)];
-            let p = tet.map(|n| rest[n as usize]);
-            let edges = Mat3::from_columns(&[p[1] - p[0], p[2] - p[0], p[3] - p[0]]);
-            // A valid mesh has no flat elements.
-            let inverse = edges.try_inverse().unwrap_or_else(Mat3::identity);
-            for a in 0..4 {
-                block.corners[a][i] = tet[a];
-            }
-            for a in 0..3 {
-                for c in 0..3 {
-                    block.gradients[a][c].0[i] = inverse[(a, c)];
-                }
-            }
-            if i < tetrahedra.len() {
-                block.volumes.0[i] = crate::mesh::signed_volume(&p);
-            }
-        }
-        block
-    }
-
-    /// Shape function gradients of the four corners of element `i` [1/m].
-    pub fn shape_gradients(&self, i: usize) -> [Vec3; 4] {
-        let g = [0, 1, 2].map(|a| Vec3::from_fn(|c, _| self.gradients[a][c].0[i]));
-        [-(g[0] + g[1] + g[2]), g[0], g[1], g[2]]
     }
 }

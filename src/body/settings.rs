@@ -1,5 +1,28 @@
 //! The knobs that trade speed for accuracy, per body.
 
+/// How the matrix of a body's step is answered. All have the same energy, guard, contact and coupling, and
+/// iterated they all come to the same motion; they differ in what an iteration costs and gains.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Solver {
+    /// Projective Dynamics [Bouaziz et al. 2014; Liu et al. 2017], the default: the constant
+    /// [`SystemMatrix`], factored once.
+    #[default]
+    Projective,
+    /// The constant matrix by conjugate gradients: no factor to make or keep. For bodies whose matrix would
+    /// change all the time, or whose factor would not fit.
+    ConjugateGradients,
+    /// One sweep of Gauss–Seidel there and back over the constant matrix, in the place of its solution
+    /// [Fratarcangeli et al. 2016]: position-based dynamics with the stiffness that was typed. Cheap and
+    /// inexact: stiff bodies turn and bend late.
+    GaussSeidel,
+    /// The diagonal that bounds the constant matrix [Wang 2015]: cheapest and least exact.
+    Jacobi,
+    /// Newton's method: the second derivatives of the energy itself, factored anew in every iteration. The
+    /// reference, and right for ropes and stiff cloth.
+    Newton,
+}
+
 /// The constant matrix of the global step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -47,7 +70,7 @@ pub enum FactorPrecision {
 }
 
 /// Acceleration of the global iteration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Acceleration {
     /// The plain iteration.
@@ -58,6 +81,17 @@ pub enum Acceleration {
         /// Pairs kept, 1 to 16.
         window: usize,
     },
+    /// Anderson's mixing of the last points [Peng et al. 2018].
+    Anderson {
+        /// Points kept, 1 to 16.
+        window: usize,
+    },
+    /// Chebyshev's semi-iteration [Wang 2015]: no memory but the last point, and no products to be summed. For
+    /// iterations that converge slowly and evenly, such as [`Solver::Jacobi`].
+    Chebyshev {
+        /// Estimate of the plain iteration's spectral radius, 0 up to 0.9999: too high a one swings.
+        radius: f64,
+    },
 }
 
 impl Default for Acceleration {
@@ -66,10 +100,61 @@ impl Default for Acceleration {
     }
 }
 
+/// How much truth a body is solved for: settings for those who do not want to choose. What each costs and how
+/// far it is off is measured in the README.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Fidelity {
+    /// Moves plausibly, three iterations of the [`SystemMatrix::Laplacian`]: stiff bodies bend and turn late.
+    Preview,
+    /// The defaults.
+    #[default]
+    Game,
+    /// Iterated until a thousandth of the error of [`Fidelity::Game`] is left; sheets by Newton's method.
+    Engineering,
+    /// [`Solver::Newton`] until little but rounding is left.
+    Reference,
+}
+
+/// What a body is made of, as far as settings depend on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Build {
+    /// Tetrahedra, with or without anything else.
+    Solid,
+    /// Sheets or springs.
+    Sheet,
+    /// Nothing but rods.
+    Rope,
+}
+
+impl Fidelity {
+    /// The settings for a body of that build.
+    pub(crate) fn settings(self, build: Build) -> SolverSettings {
+        let defaults = SolverSettings::default();
+        let laplacian = SolverSettings { system: SystemMatrix::Laplacian, ..defaults };
+        let newton = SolverSettings { solver: Solver::Newton, ..defaults };
+        match (self, build) {
+            (Self::Preview, Build::Rope) => SolverSettings { max_iterations: 1, tolerance: 0.0, ..newton },
+            (Self::Preview, _) => SolverSettings { max_iterations: 3, tolerance: 0.0, ..laplacian },
+            (Self::Game, Build::Solid) => defaults,
+            // Their largest force is at the pins, hundreds of times that on other nodes.
+            (Self::Game, Build::Sheet) => SolverSettings { tolerance: 1.0e-3, ..laplacian },
+            (Self::Game, Build::Rope) => newton,
+            (Self::Engineering, Build::Solid) => {
+                SolverSettings { max_iterations: 50, tolerance: 1.0e-5, ..defaults }
+            }
+            (Self::Engineering, _) => SolverSettings { max_iterations: 30, tolerance: 1.0e-5, ..newton },
+            (Self::Reference, _) => SolverSettings { max_iterations: 100, tolerance: 1.0e-10, ..newton },
+        }
+    }
+}
+
 /// How hard a body is solved. The defaults were chosen from measured error-against-time curves, see
 /// the README.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverSettings {
+    /// What an iteration does.
+    pub solver: Solver,
     /// The constant matrix.
     pub system: SystemMatrix,
     /// Frames of the rest stiffness.
@@ -84,17 +169,23 @@ pub struct SolverSettings {
     pub acceleration: Acceleration,
     /// Numbers of the factor.
     pub precision: FactorPrecision,
+    /// Whether a body in free flight keeps its spin. Implicit Euler loses it, 42 % in a second at 10 rad/s and
+    /// steps of 1/100 s: what it lost is given back after the step, as a rotation of the velocities. On by
+    /// default; a body that is held, or touched by anything, is left alone.
+    pub keeps_spin: bool,
 }
 
 impl Default for SolverSettings {
     fn default() -> Self {
         Self {
+            solver: Solver::default(),
             system: SystemMatrix::default(),
             frames: Frames::default(),
             max_iterations: 10,
             tolerance: 5.0e-3,
             acceleration: Acceleration::default(),
             precision: FactorPrecision::default(),
+            keeps_spin: true,
         }
     }
 }

@@ -4,9 +4,11 @@ use super::obstacle::Obstacle;
 use super::rim_rows::{corner_on_triangle, corners_in, rim_crossing};
 use super::row::{Law, Row, Side};
 use super::surface_point::{Scales, SurfacePoint, surface_point};
+use super::thin::{looks_away, segment_point, side_of_node};
 use super::triangle_rows::triangle_point;
 use crate::body::{ContactKey, ContactMemory, DeformableModel};
 use crate::math::{Vec3, from_real, to_real};
+use crate::mesh::NONE;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 
 /// A body and an obstacle that may touch: filters have been passed and coefficients combined.
@@ -35,6 +37,8 @@ pub(crate) struct Detector {
     /// Per surface node, in the world: normal, and how far the node may come.
     pub normals: Vec<Vec3>,
     pub reach: Vec<f64>,
+    /// Where each surface node would go over the step.
+    motions: Vec<Vec3>,
     /// Per surface node, in the obstacle's frame.
     local: Vec<Vec3>,
     nodes: Vec<Option<SurfacePoint>>,
@@ -66,19 +70,26 @@ impl Detector {
         self.normals.clear();
         self.normals.resize(surface.nodes.len(), Vec3::zeros());
         self.faces.clear();
-        for triangle in &surface.triangles {
+        for (t, triangle) in surface.triangles.iter().enumerate() {
             let [a, b, c] = triangle.map(|n| x[n as usize]);
             let area = (b - a).cross(&(c - a));
-            triangle.iter().for_each(|&n| self.normals[surface.index_of_node[n as usize] as usize] += area);
+            // Where a sheet meets a solid, the solid has the say.
+            for s in triangle.map(|n| surface.index_of_node[n as usize] as usize) {
+                if t < surface.closed || surface.is_thin[s] {
+                    self.normals[s] += area;
+                }
+            }
             // None for a triangle that has shrunk to nothing.
             self.faces.push(area.try_normalize(0.0).unwrap_or_default());
         }
         // A node whose triangles cancel has no outside; any direction serves.
         self.normals.iter_mut().for_each(|n| *n = n.try_normalize(0.0).unwrap_or(Vec3::y()));
         let margin = STATIC_MARGIN * surface.mean_edge;
-        let motion = |&n: &u32| margin + (target[n as usize] - x[n as usize]).norm();
+        self.motions.clear();
+        self.motions.extend(surface.nodes.iter().map(|&n| target[n as usize] - x[n as usize]));
+        let skins = surface.nodes.iter().map(|&n| model.half_thickness[n as usize]);
         self.reach.clear();
-        self.reach.extend(surface.nodes.iter().map(motion));
+        self.reach.extend(self.motions.iter().zip(skins).map(|(motion, skin)| margin + skin + motion.norm()));
     }
 
     /// Box around all that the body may touch over the step.
@@ -114,12 +125,13 @@ impl Detector {
             scales: Scales { band: BAND * model.size, shift: SHIFT * surface.mean_edge },
             motion: if moves { surface.nodes.iter().map(motion).fold(0.0, f64::max) } else { 0.0 },
         };
-        self.detect_nodes(&scene, rows);
+        self.detect_nodes(&scene, memory, rows);
         if !obstacle.is_half_space() {
             self.detect_rims(&scene, rows);
             self.detect_corners(&scene, rows);
             self.keep_points(&scene, memory, rows);
             self.detect_triangles(&scene, rows);
+            self.detect_segments(&scene, rows);
         }
         if obstacle.is_faceted() {
             one_row_per_feature(rows, first);
@@ -127,8 +139,9 @@ impl Detector {
         rows[first..].sort_unstable_by_key(|r| r.key);
     }
 
-    fn detect_nodes(&mut self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
-        let nodes = &scene.model.surface.nodes;
+    fn detect_nodes(&mut self, scene: &Scene<'_>, memory: &[ContactMemory], rows: &mut Vec<Row>) {
+        let surface = &scene.model.surface;
+        let nodes = &surface.nodes;
         self.nodes.clear();
         self.nodes.resize(nodes.len(), None);
         for s in 0..nodes.len() {
@@ -137,7 +150,12 @@ impl Detector {
             if !near(&scene.extent, &p, reach) {
                 continue;
             }
-            let outward = scene.obstacle.start.rotation.tr_mul(&self.normals[s]);
+            let to_local = |v: &Vec3| scene.obstacle.start.rotation.tr_mul(v);
+            let outward = if surface.is_thin[s] {
+                side_of_node(scene.obstacle, nodes[s], &p, &to_local(&self.motions[s]), memory)
+            } else {
+                to_local(&self.normals[s])
+            };
             self.nodes[s] = surface_point(scene.obstacle, &p, &outward, &scene.scales);
             if let Some(found) = self.nodes[s].filter(|f| f.gap < reach) {
                 rows.push(scene.row([nodes[s], 0, 0], [1.0, 0.0, 0.0], &found, nodes[s]));
@@ -162,7 +180,10 @@ impl Detector {
                     continue;
                 }
                 let [a, b] = [self.local[ends[inner]], self.local[ends[outer]]];
-                let outward = self.edge_normal(surface, e);
+                let mut outward = self.edge_normal(surface, e);
+                if surface.is_thin[ends[0]] && surface.is_thin[ends[1]] {
+                    outward = -on_face.normal;
+                }
                 let crossing = rim_crossing(scene.obstacle, &on_face, &a, &b, &outward, &scene.scales);
                 let deeper =
                     |f: &SurfacePoint| best.as_ref().is_none_or(|(_, b): &(Row, SurfacePoint)| f.gap < b.gap);
@@ -196,8 +217,14 @@ impl Detector {
                 if !around.contains_local_point(at) {
                     continue;
                 }
+                let turned = t >= surface.closed && self.looks_away(scene, triangle, &corners);
+                let [a, b, c] = corners;
+                let corners = if turned { [a, c, b] } else { corners };
                 let found = corner_on_triangle(corner, &corners, reach, &scene.scales);
-                let Some((weights, row)) = found else { continue };
+                let Some((mut weights, row)) = found else { continue };
+                if turned {
+                    weights.swap(1, 2);
+                }
                 if best.is_none_or(|(_, _, b)| row.gap.abs() < b.gap.abs()) {
                     best = Some((t, weights, row));
                 }
@@ -229,7 +256,10 @@ impl Detector {
             }
             let [a, b, c] = s.map(|s| self.local[s]);
             let p = a * weights[0] + b * weights[1] + c * weights[2];
-            let outward = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
+            let mut outward = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
+            if s.iter().any(|&s| surface.is_thin[s]) {
+                outward = -scene.obstacle.start.rotation.tr_mul(&kept.geometry.frame[0]);
+            }
             let reach = s.iter().fold(0.0, |a: f64, &s| a.max(self.reach[s])) + scene.motion;
             let found = surface_point(scene.obstacle, &p, &outward, &scene.scales);
             if let Some(found) = found.filter(|f| f.gap < reach && f.normal.dot(&outward) < 0.0) {
@@ -258,19 +288,60 @@ impl Detector {
             let own = [e0, e1, e2, scene.triangle_feature(t)];
             let points = self.points.iter().filter(|(feature, ..)| own.contains(feature)).map(|p| &p.2);
             let known = known.chain(edges.into_iter().flatten()).chain(standing).chain(points);
-            if let Some(hit) = triangle_point(scene.obstacle, &corners, known, reach, &scene.scales) {
+            let turned = t >= surface.closed && self.looks_away(scene, triangle, &corners);
+            let corners = if turned { [corners[0], corners[2], corners[1]] } else { corners };
+            if let Some(mut hit) = triangle_point(scene.obstacle, &corners, known, reach, &scene.scales) {
+                if turned {
+                    hit.weights.swap(1, 2);
+                }
                 let feature = match hit.weights.iter().position(|w| *w == 0.0) {
                     Some(opposite) => scene.edge_feature(surface.triangle_edges[t][opposite] as usize),
                     None => scene.triangle_feature(t),
                 };
-                let taken = |slot: u32| self.points.iter().any(|p| (p.0, p.1) == (feature, slot));
-                let slot = (FIRST_POINT..).find(|&slot| !taken(slot)).unwrap_or(FIRST_POINT);
+                let slot = self.free_slot(feature);
                 self.points.push((feature, slot, hit.surface));
                 let mut row = scene.row(*triangle, hit.weights, &hit.surface, feature);
                 row.key.slot = slot;
                 rows.push(row);
             }
         }
+    }
+
+    /// Contacts inside the segments of rods.
+    fn detect_segments(&mut self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
+        let surface = &scene.model.surface;
+        let alone = surface.edge_triangles.iter().enumerate().filter(|(_, sides)| sides[0] == NONE);
+        for (e, _) in alone {
+            let s = surface.edges[e].map(|n| surface.index_of_node[n as usize] as usize);
+            let ends = s.map(|s| self.local[s]);
+            let reach = self.reach[s[0]].max(self.reach[s[1]]) + scene.motion;
+            let around = Aabb::from_points(ends.iter().map(to_real)).loosened(reach as f32);
+            if !around.intersects(&scene.extent) {
+                continue;
+            }
+            let feature = scene.edge_feature(e);
+            let points = self.points.iter().filter(|p| p.0 == feature).map(|p| &p.2);
+            let known = s.iter().filter_map(|&s| self.nodes[s].as_ref()).chain(&self.edges[e]).chain(points);
+            if let Some((t, found)) = segment_point(scene.obstacle, &ends, known, reach, &scene.scales) {
+                let [a, b] = surface.edges[e];
+                let mut row = scene.row([a, b, a], [1.0 - t, t, 0.0], &found, feature);
+                row.key.slot = self.free_slot(feature);
+                rows.push(row);
+            }
+        }
+    }
+
+    /// The first slot of a feature that no closest point has yet.
+    fn free_slot(&self, feature: u32) -> u32 {
+        let taken = |slot: u32| self.points.iter().any(|p| (p.0, p.1) == (feature, slot));
+        (FIRST_POINT..).find(|&slot| !taken(slot)).unwrap_or(FIRST_POINT)
+    }
+
+    /// Whether a triangle of a sheet has to be turned over for this obstacle.
+    fn looks_away(&self, scene: &Scene<'_>, triangle: &[u32; 3], corners: &[Vec3; 3]) -> bool {
+        let s = triangle.map(|n| scene.model.surface.index_of_node[n as usize] as usize);
+        let found = s.iter().filter_map(|&s| self.nodes[s].as_ref());
+        looks_away(scene.obstacle, corners, found)
     }
 
     /// Whether a triangle's corners all touch the same plane face: there is nothing to add then.
@@ -289,7 +360,7 @@ impl Detector {
             let [a, b, c] = triangle.map(|n| self.local[surface.index_of_node[n as usize] as usize]);
             (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default()
         };
-        let sum: Vec3 = surface.edge_triangles[edge].iter().map(normal).sum();
+        let sum: Vec3 = surface.edge_triangles[edge].iter().filter(|t| **t != NONE).map(normal).sum();
         sum.try_normalize(0.0).unwrap_or_default()
     }
 }
@@ -314,7 +385,9 @@ impl Scene<'_> {
             Side::Partner { partner: obstacle.partner, point: obstacle.start.transform(&found.point) };
         let key = ContactKey { obstacle: obstacle.key, part: obstacle.part, feature, slot: 0 };
         let normal = obstacle.start.rotation * found.normal;
-        let mut row = Row::new([soft, partner], normal.normalize(), found.gap, key);
+        let skin = nodes.iter().zip(weights).map(|(&n, w)| self.model.half_thickness[n as usize] * w);
+        let gap = found.gap - skin.sum::<f64>();
+        let mut row = Row::new([soft, partner], normal.normalize(), gap, key);
         row.law = Law::Contact { friction: self.pair.friction };
         row.restitution = self.pair.restitution;
         row

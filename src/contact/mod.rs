@@ -15,6 +15,7 @@ mod row;
 mod surface_point;
 mod surface_tree;
 mod tangle;
+mod thin;
 mod triangle_rows;
 
 pub(crate) use between::{BetweenDetector, SoftPair, SoftSurface};

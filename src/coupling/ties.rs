@@ -1,4 +1,5 @@
-//! Attachments as rows: three per vertex, along the axes of the world.
+//! Attachments as rows: three per vertex, along the axes of the world; of cables one along
+//! them, and what draws them straight.
 
 use super::obstacles::RapierScene;
 use super::parts::RapierSets;
@@ -9,6 +10,9 @@ use rapier3d::math::Vector;
 
 /// Slot of the keys of attachments' rows.
 const TIE_SLOT: u32 = FIRST_LINK_SLOT + 3;
+
+/// Feature of a cable's row, and of two that stand across; those of ties are the axes.
+const CABLE: u32 = 3;
 
 /// The attachment that a row belongs to.
 pub(crate) fn attachment_of(key: &ContactKey) -> Option<u64> {
@@ -55,9 +59,32 @@ pub(crate) fn tie_rows(
                 }
             };
             let Some(other) = other else { continue };
+            let key =
+                |feature: u32| ContactKey { obstacle: handle.0, part: k as u32, feature, slot: TIE_SLOT };
+            if attachment.length() > 0.0 {
+                // Inwards, as the inside of a ball of that radius would push. Without a direction there is slack.
+                let Some(inwards) = (point - x).try_normalize(0.0) else { continue };
+                let distance = (point - x).norm();
+                let mut row =
+                    Row::new([soft(own, node), other], inwards, attachment.length() - distance, key(CABLE));
+                row.compliance = attachment.compliance();
+                // A cable that is drawn aside pulls back with its tension over its length. Left to the next
+                // step, that throws about whatever is lighter than h² times as much.
+                let last = deformables.iter().find_map(|(_, b)| b.state.closure_row(&key(CABLE)));
+                let tension = last.map_or(0.0, |memory| memory.force.norm());
+                if tension > 0.0 {
+                    for (axis, feature) in [(row.frame[1], CABLE + 1), (row.frame[2], CABLE + 2)] {
+                        let mut aside = Row::new(row.sides, axis, 0.0, key(feature));
+                        aside.law = Law::Held { limit: f64::INFINITY };
+                        aside.compliance = distance / tension;
+                        rows.push(aside);
+                    }
+                }
+                rows.push(row);
+                continue;
+            }
             for axis in 0..3 {
-                let key =
-                    ContactKey { obstacle: handle.0, part: k as u32, feature: axis as u32, slot: TIE_SLOT };
+                let key = key(axis as u32);
                 let mut row =
                     Row::new([soft(own, node), other], Vec3::ith(axis, 1.0), x[axis] - point[axis], key);
                 row.law = Law::Held { limit: f64::INFINITY };

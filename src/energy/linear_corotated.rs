@@ -4,10 +4,11 @@
 //! Stress `P = 2μ(F − R) + λ tr(RᵀF − I) R`, exact: R maximises tr(RᵀF), so its own change drops
 //! out of both terms.
 
-use super::{ElementEnergy, Response};
+use super::{ElementEnergy, Principal, Response};
 use crate::material::Lame;
 use crate::math::lanes::{Lane, LaneMat3};
 use crate::math::polar::polar_rotations;
+use crate::math::{Mat3, Vec3};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LinearCorotated(pub Lame);
@@ -24,6 +25,17 @@ impl ElementEnergy for LinearCorotated {
             density: deviation.dot(&deviation) * mu + trace * trace * (0.5 * lambda),
             stress: deviation.scaled(Lane::splat(2.0 * mu)).plus_scaled(&rotation, trace * lambda),
             rotation,
+        }
+    }
+
+    fn principal(&self, stretches: &Vec3) -> Principal {
+        let Lame { mu, lambda } = self.0;
+        let strain = stretches.map(|s| s - 1.0);
+        let trace = strain.sum();
+        Principal {
+            density: mu * strain.norm_squared() + 0.5 * lambda * trace * trace,
+            gradient: strain * (2.0 * mu) + Vec3::repeat(lambda * trace),
+            hessian: Mat3::from_diagonal_element(2.0 * mu) + Mat3::repeat(lambda),
         }
     }
 

@@ -1,15 +1,28 @@
-//! Elastic energies of a tetrahedron, one file each.
+//! Elastic energies, one file each: of tetrahedra, of triangles ([`membrane`]), and of whatever has a length
+//! that it wants to keep ([`stencil`]): springs, bent rods and sheets, muscle fibres.
 //!
-//! To add one: a file with a type that implements [`ElementEnergy`], a variant of [`Elasticity`],
-//! and its line in `with_energy!`. The finite-difference test below covers every variant.
+//! To add one for tetrahedra: a file with a type that implements [`ElementEnergy`], a variant of
+//! [`Elasticity`] and its place in `Elasticity::ALL`, and its line in `with_energy!`. The tests below cover
+//! every variant.
 
+mod fixed_corotated;
 mod linear_corotated;
+pub(crate) mod membrane;
+mod neo_hookean;
+mod principal;
 mod projective;
+pub(crate) mod stencil;
+pub(crate) mod strain_limit;
 
+pub(crate) use fixed_corotated::FixedCorotated;
 pub(crate) use linear_corotated::LinearCorotated;
+pub(crate) use neo_hookean::NeoHookean;
+pub(crate) use principal::{Mode, Principal, modes};
 pub(crate) use projective::Projective;
+pub(crate) use strain_limit::Limited;
 
 use crate::math::lanes::{Lane, LaneMat3};
+use crate::math::{Mat3, Vec3};
 
 /// The elastic energy of a body's tetrahedra, as a function of the deformation gradient `F`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -23,6 +36,18 @@ pub enum Elasticity {
     /// `3λ/2·‖F − D‖²` with D the nearest matrix of determinant 1 (weight 3λ). The same as
     /// [`Elasticity::LinearCorotated`] at small strain; keeps volume better at large.
     Projective,
+    /// `μ‖F − R‖² + λ/2·(det F − 1)²` [Stomakhin et al. 2012]: as the linear one, with the volume itself in
+    /// the place of its linear part.
+    FixedCorotated,
+    /// Stable neo-Hookean, `μ/2·(tr FᵀF − 3) − μ(J − 1) + (λ + μ)/2·(J − 1)²` with J = det F
+    /// [Smith et al. 2018]: rubber at large strain, finite when inverted.
+    NeoHookean,
+}
+
+impl Elasticity {
+    /// Every variant.
+    pub const ALL: [Self; 4] =
+        [Self::LinearCorotated, Self::Projective, Self::FixedCorotated, Self::NeoHookean];
 }
 
 /// What an element answers to its deformation.
@@ -41,6 +66,9 @@ pub(crate) trait ElementEnergy: Copy + Send + Sync {
     /// Density, stress and rotation at the deformation gradients `F`.
     fn evaluate(&self, F: &LaneMat3) -> Response;
 
+    /// Density and its derivatives by the principal stretches, of which the last may be negative.
+    fn principal(&self, stretches: &Vec3) -> Principal;
+
     /// Weight w \[Pa\] of the element's Laplacian in the Projective Dynamics matrix
     /// `M/h² + Σ w V GᵀG`: an upper bound of the energy's curvature.
     fn laplacian_weight(&self) -> f64;
@@ -49,20 +77,50 @@ pub(crate) trait ElementEnergy: Copy + Send + Sync {
 /// Runs `$body` with `$energy` bound to the energy of a material.
 macro_rules! with_energy {
     ($material:expr, $energy:ident => $body:expr) => {{
-        let lame = $material.lame();
-        match $material.elasticity {
-            $crate::energy::Elasticity::LinearCorotated => {
-                let $energy = $crate::energy::LinearCorotated(lame);
-                $body
+        use $crate::energy::{Elasticity, FixedCorotated, LinearCorotated, NeoHookean, Projective};
+        let (material, lame) = ($material, $material.lame());
+        match material.elasticity {
+            Elasticity::LinearCorotated => {
+                $crate::energy::limited_or_not!(material, LinearCorotated(lame), $energy => $body)
             }
-            $crate::energy::Elasticity::Projective => {
-                let $energy = $crate::energy::Projective(lame);
-                $body
+            Elasticity::Projective => {
+                $crate::energy::limited_or_not!(material, Projective(lame), $energy => $body)
+            }
+            Elasticity::FixedCorotated => {
+                $crate::energy::limited_or_not!(material, FixedCorotated(lame), $energy => $body)
+            }
+            Elasticity::NeoHookean => {
+                $crate::energy::limited_or_not!(material, NeoHookean(lame), $energy => $body)
             }
         }
     }};
 }
 pub(crate) use with_energy;
+
+/// Runs `$body` with `$energy` bound to `$own`, within the material's limits of strain if it has such.
+macro_rules! limited_or_not {
+    ($material:expr, $own:expr, $energy:ident => $body:expr) => {
+        match $material.strain_limits {
+            None => {
+                let $energy = $own;
+                $body
+            }
+            Some(limits) => {
+                let weight = $material.limit_weight();
+                let $energy = $crate::energy::Limited { energy: $own, limits, weight };
+                $body
+            }
+        }
+    };
+}
+pub(crate) use limited_or_not;
+
+/// The product of three stretches, its gradient and its second derivatives.
+fn determinant_terms(s: &Vec3) -> (f64, Vec3, Mat3) {
+    let slope = Vec3::new(s.y * s.z, s.z * s.x, s.x * s.y);
+    let curvature = Mat3::new(0.0, s.z, s.y, s.z, 0.0, s.x, s.y, s.x, 0.0);
+    (s.x * s.y * s.z, slope, curvature)
+}
 
 #[cfg(test)]
 mod tests {
@@ -71,10 +129,14 @@ mod tests {
     use crate::math::Mat3;
     use proptest::prelude::*;
 
-    const ALL: [Elasticity; 2] = [Elasticity::LinearCorotated, Elasticity::Projective];
+    /// Every energy without limits, and one with them.
+    fn all() -> impl Iterator<Item = DeformableMaterial> {
+        let plain = DeformableMaterial::new(1.0, 0.4);
+        let limited = plain.strain_limits(0.9, 1.1);
+        Elasticity::ALL.into_iter().map(move |e| plain.elasticity(e)).chain([limited])
+    }
 
-    fn response(elasticity: Elasticity, F: &Mat3) -> (f64, Mat3) {
-        let material = DeformableMaterial::new(1.0, 0.4).elasticity(elasticity);
+    fn response(material: &DeformableMaterial, F: &Mat3) -> (f64, Mat3) {
         let mut block = LaneMat3::default();
         for i in 0..4 {
             block.set_lane(i, F);
@@ -93,45 +155,66 @@ mod tests {
         fn stress_is_the_gradient_of_every_energy(F in deformation(), dF in deformation()) {
             // Inverted states have creases of the energy; their recovery is a test of its own.
             prop_assume!(F.determinant() > 0.05);
-            for elasticity in ALL {
+            for material in all() {
                 let eps = 1e-5;
-                let ahead = response(elasticity, &(F + dF * eps)).0;
-                let behind = response(elasticity, &(F - dF * eps)).0;
-                let slope = response(elasticity, &F).1.dot(&dF);
+                let ahead = response(&material, &(F + dF * eps)).0;
+                let behind = response(&material, &(F - dF * eps)).0;
+                let slope = response(&material, &F).1.dot(&dF);
                 let difference = (ahead - behind) / (2.0 * eps);
                 // Central differences: eps² × third derivative (≤ 1e3 near det 0.05) + 1e-16/eps.
-                prop_assert!((difference - slope).abs() < 1e-6 * (1.0 + slope.abs()), "{elasticity:?}");
+                prop_assert!((difference - slope).abs() < 1e-6 * (1.0 + slope.abs()), "{material:?}");
+            }
+        }
+
+        #[test]
+        fn principal_derivatives_are_those_of_every_energy(F in deformation(), dF in deformation()) {
+            prop_assume!(F.determinant() > 0.05);
+            for material in all() {
+                let (_, sigma, _) = crate::math::polar::signed_svd(&F);
+                let at = |s: &Vec3| with_energy!(material, energy => energy.principal(s));
+                let here = at(&sigma);
+                prop_assert!((here.density - response(&material, &F).0).abs() < 1e-12 * (1.0 + here.density));
+                // The modes are the derivative of the stress: central differences, 1e-10 · third derivative.
+                // Where a stretch is at a limit there are two.
+                if let Some(limits) = material.strain_limits {
+                    prop_assume!(sigma.iter().all(|s| limits.iter().all(|l| (s - l).abs() > 1e-3)));
+                }
+                let eps = 1e-5;
+                let slope = (response(&material, &(F + dF * eps)).1 - response(&material, &(F - dF * eps)).1) / (2.0 * eps);
+                let product = with_energy!(material, energy => modes(&F, |s| energy.principal(s)))
+                    .iter()
+                    .fold(Mat3::zeros(), |sum, m| sum + m.shape * (m.stiffness * m.shape.dot(&dF)));
+                prop_assert!((slope - product).norm() < 1e-5 * (1.0 + product.norm()), "{material:?} {slope} {product}");
             }
         }
 
         #[test]
         fn every_energy_is_linear_elasticity_at_small_strain(dF in deformation()) {
-            let material = DeformableMaterial::new(1.0, 0.4);
-            let lame = material.lame();
+            let lame = DeformableMaterial::new(1.0, 0.4).lame();
             let strain = (dF + dF.transpose()) * 0.5 * 1e-5;
             let linear = strain * (2.0 * lame.mu) + Mat3::identity() * (lame.lambda * strain.trace());
-            for elasticity in ALL {
-                let stress = response(elasticity, &(Mat3::identity() + strain)).1;
+            for material in all() {
+                let stress = response(&material, &(Mat3::identity() + strain)).1;
                 // Second-order terms: strain² = 1e-10, times λ ≈ 1.5 and a few.
-                prop_assert!((stress - linear).norm() < 1e-8, "{elasticity:?}");
+                prop_assert!((stress - linear).norm() < 1e-8, "{material:?}");
             }
         }
 
         #[test]
         fn rotation_costs_nothing(x in -3.0..3.0f64, y in -3.0..3.0f64, z in -3.0..3.0f64) {
             let R = crate::math::rotation_from_vector(&crate::math::Vec3::new(x, y, z));
-            for elasticity in ALL {
-                let (density, stress) = response(elasticity, &R);
-                prop_assert!(density.abs() < 1e-28 && stress.norm() < 1e-13, "{elasticity:?}");
+            for material in all() {
+                let (density, stress) = response(&material, &R);
+                prop_assert!(density.abs() < 1e-28 && stress.norm() < 1e-13, "{material:?}");
             }
         }
 
         #[test]
         fn energies_are_finite_for_any_deformation(v in proptest::collection::vec(
             prop_oneof![4 => -3.0..3.0f64, 1 => Just(0.0), 1 => Just(1e-200), 1 => Just(-1e8)], 9)) {
-            for elasticity in ALL {
-                let (density, stress) = response(elasticity, &Mat3::from_column_slice(&v));
-                prop_assert!(density.is_finite() && stress.iter().all(|s| s.is_finite()), "{elasticity:?}");
+            for material in all() {
+                let (density, stress) = response(&material, &Mat3::from_column_slice(&v));
+                prop_assert!(density.is_finite() && stress.iter().all(|s| s.is_finite()), "{material:?}");
             }
         }
     }

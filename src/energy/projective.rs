@@ -5,7 +5,7 @@
 //! term is `λ/2·(tr ε)²`: the distance to det = 1 is |tr ε|/√3, hence 3λ and not λ.
 //! Stress `P = 2μ(F − R) + 3λ(F − D)`: both are gradients of squared distances.
 
-use super::{ElementEnergy, Response};
+use super::{ElementEnergy, Principal, Response, determinant_terms};
 use crate::material::Lame;
 use crate::math::lanes::{LANES, Lane, LaneMat3};
 use crate::math::polar::{polar_rotations, signed_svd};
@@ -29,6 +29,25 @@ impl ElementEnergy for Projective {
             density: shape.dot(&shape) * mu + volume.dot(&volume) * (1.5 * lambda),
             stress: shape.scaled(Lane::splat(2.0 * mu)).plus_scaled(&volume, Lane::splat(3.0 * lambda)),
             rotation,
+        }
+    }
+
+    /// The projection d solves `d − σ + ν n(d) = 0`, `Π d = 1` with n the gradient of the product; its
+    /// derivative is that of these equations.
+    fn principal(&self, stretches: &Vec3) -> Principal {
+        let Lame { mu, lambda } = self.0;
+        let strain = stretches.map(|s| s - 1.0);
+        let nearest = nearest_of_unit_product(stretches);
+        let volume = stretches - nearest;
+        let (_, normal, curvature) = determinant_terms(&nearest);
+        let multiplier = volume.dot(&normal) / normal.norm_squared();
+        let inner = (Mat3::identity() + curvature * multiplier).try_inverse().unwrap_or_else(Mat3::identity);
+        let across = inner * normal;
+        let moved = inner - across * across.transpose() / normal.dot(&across);
+        Principal {
+            density: mu * strain.norm_squared() + 1.5 * lambda * volume.norm_squared(),
+            gradient: strain * (2.0 * mu) + volume * (3.0 * lambda),
+            hessian: Mat3::from_diagonal_element(2.0 * mu) + (Mat3::identity() - moved) * (3.0 * lambda),
         }
     }
 
@@ -87,7 +106,21 @@ fn nearest_of_unit_product(sigma: &Vec3) -> Vec3 {
     }
     // Remove the drift of Σt that the roundings of the steps left.
     let drift = t.mean();
-    t.map(|v| (v - drift).exp())
+    polished(&t.map(|v| (v - drift).exp()), sigma)
+}
+
+/// One Newton step on `d − σ + ν n(d) = 0`, `Π d = 1`: where the distance is flat to its last digit, its
+/// slope is not.
+fn polished(d: &Vec3, sigma: &Vec3) -> Vec3 {
+    let (product, normal, curvature) = determinant_terms(d);
+    let multiplier = (sigma - d).dot(&normal) / normal.norm_squared();
+    let residual = sigma - d - normal * multiplier;
+    let Some(inner) = (Mat3::identity() + curvature * multiplier).try_inverse() else { return *d };
+    let across = inner * normal;
+    let change = (normal.dot(&(inner * residual)) - (1.0 - product)) / normal.dot(&across);
+    let next = d + inner * residual - across * change;
+    // Written so that a step that is no number is not taken.
+    if (next - d).amax() < 1e-6 { next } else { *d }
 }
 
 #[cfg(test)]

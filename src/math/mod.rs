@@ -17,6 +17,11 @@ pub(crate) type Vec3 = nalgebra::Vector3<f64>;
 /// A 3×3 matrix of the solver.
 pub(crate) type Mat3 = nalgebra::Matrix3<f64>;
 
+/// A 2×2 matrix of the solver.
+pub(crate) type Mat2 = nalgebra::Matrix2<f64>;
+/// A 3×2 matrix of the solver.
+pub(crate) type Mat3x2 = nalgebra::Matrix3x2<f64>;
+
 /// Widens one of rapier's vectors.
 pub(crate) fn from_real(v: Vector) -> Vec3 {
     Vec3::new(v.x as f64, v.y as f64, v.z as f64)

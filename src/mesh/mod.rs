@@ -1,4 +1,4 @@
-//! Geometry of bodies at rest: tetrahedra, their surface, and where they come from.
+//! Geometry of bodies at rest: tetrahedra, sheets, rods, their surface, and where they come from.
 //!
 //! Architecture invariant: nothing here knows materials, time or rapier's sets.
 
@@ -7,10 +7,12 @@ mod fill;
 mod gmsh;
 mod lattice;
 mod ordering;
+mod structure;
 mod surface;
 mod tet_mesh;
 
 pub(crate) use ordering::{node_adjacency, sweep_order};
-pub(crate) use surface::Surface;
+pub use structure::Structure;
+pub(crate) use surface::{NONE, Surface};
 pub use tet_mesh::{MeshError, TetMesh};
 pub(crate) use tet_mesh::{signed_volume, tetrahedron_holds};

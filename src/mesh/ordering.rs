@@ -22,12 +22,12 @@ pub(crate) fn sweep_order(positions: &[Vec3]) -> Vec<u32> {
     order
 }
 
-/// Sorted neighbours of every node: nodes that share a tetrahedron with it.
-pub(crate) fn node_adjacency(tetrahedra: &[[u32; 4]], nodes: usize) -> Vec<Vec<u32>> {
+/// Sorted neighbours of every node: nodes that share an element with it.
+pub(crate) fn node_adjacency<'a>(elements: impl Iterator<Item = &'a [u32]>, nodes: usize) -> Vec<Vec<u32>> {
     let mut adjacency = vec![Vec::new(); nodes];
-    for tet in tetrahedra {
-        for &a in tet {
-            adjacency[a as usize].extend(tet.iter().filter(|&&b| b != a));
+    for element in elements {
+        for &a in element {
+            adjacency[a as usize].extend(element.iter().filter(|&&b| b != a));
         }
     }
     for list in &mut adjacency {

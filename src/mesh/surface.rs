@@ -1,26 +1,33 @@
 //! The boundary surface of a tetrahedral mesh.
 
 use crate::math::Vec3;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// The faces of a positively oriented tetrahedron, wound so that normals point outward.
 const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
 
-/// Triangles, edges and nodes on the boundary of a mesh.
+/// No triangle.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// Triangles, edges and nodes on the boundary of a body: of its tetrahedra, and its sheets and rods.
 #[derive(Clone, Debug)]
 pub(crate) struct Surface {
-    /// Mesh nodes of each triangle, wound outward.
+    /// Mesh nodes of each triangle; of tetrahedra first, wound outward, then those of sheets.
     pub triangles: Vec<[u32; 3]>,
+    /// Triangles that bound a solid: they have an outside.
+    pub closed: usize,
     /// Mesh nodes on the surface, ascending.
     pub nodes: Vec<u32>,
     /// Mesh nodes of each edge, ascending within the edge.
     pub edges: Vec<[u32; 2]>,
     /// Edges of each triangle, the k-th opposite corner k.
     pub triangle_edges: Vec<[u32; 3]>,
-    /// The two triangles on each edge.
+    /// The two triangles on each edge; [`NONE`] beyond the border of a sheet and along rods.
     pub edge_triangles: Vec<[u32; 2]>,
-    /// A triangle at each surface node.
+    /// A triangle at each surface node; [`NONE`] along rods.
     pub node_triangle: Vec<u32>,
+    /// Whether each surface node is on sheets and rods only, which have no outside.
+    pub is_thin: Vec<bool>,
     /// Index into `nodes` per mesh node; `u32::MAX` inside the body.
     pub index_of_node: Vec<u32>,
     /// Mean length of the edges at rest \[m\].
@@ -28,42 +35,62 @@ pub(crate) struct Surface {
 }
 
 impl Surface {
-    /// Extracts the surface of a valid mesh.
-    pub fn new(tetrahedra: &[[u32; 4]], rest: &[Vec3]) -> Self {
-        let triangles = boundary_triangles(tetrahedra).unwrap_or_default();
+    /// The surface of valid tetrahedra, `sheets` and `segments` of rods.
+    pub fn new(tetrahedra: &[[u32; 4]], sheets: &[[u32; 3]], segments: &[[u32; 2]], rest: &[Vec3]) -> Self {
+        let mut triangles = boundary_triangles(tetrahedra).unwrap_or_default();
+        let closed = triangles.len();
+        // A skin on a solid is the solid's surface.
+        let known: HashSet<[u32; 3]> = triangles.iter().map(|t| sorted(*t)).collect();
+        triangles.extend(sheets.iter().filter(|t| !known.contains(&sorted(**t))));
         let mut index_of_node = vec![u32::MAX; rest.len()];
-        triangles.iter().flatten().for_each(|&n| index_of_node[n as usize] = 0);
+        let on_surface = triangles.iter().flatten().chain(segments.iter().flatten());
+        on_surface.for_each(|&n| index_of_node[n as usize] = 0);
         let nodes: Vec<u32> = (0..rest.len() as u32).filter(|&n| index_of_node[n as usize] == 0).collect();
         for (i, &n) in nodes.iter().enumerate() {
             index_of_node[n as usize] = i as u32;
         }
-        let edges: Vec<[u32; 2]> = edge_uses(&triangles).into_iter().map(|u| u.edge).collect();
+        let mut edges: Vec<[u32; 2]> = edge_uses(&triangles).into_iter().map(|u| u.edge).collect();
+        edges.extend(segments.iter().map(|&[a, b]| [a.min(b), a.max(b)]));
+        edges.sort_unstable();
+        edges.dedup();
         let find = |a: u32, b: u32| edges.binary_search(&[a.min(b), a.max(b)]).unwrap_or(0) as u32;
         let triangle_edges: Vec<[u32; 3]> =
             triangles.iter().map(|&[a, b, c]| [find(b, c), find(c, a), find(a, b)]).collect();
-        let mut edge_triangles = vec![[u32::MAX; 2]; edges.len()];
+        let mut edge_triangles = vec![[NONE; 2]; edges.len()];
         for (t, of_triangle) in triangle_edges.iter().enumerate() {
             for &e in of_triangle {
                 let pair = &mut edge_triangles[e as usize];
-                pair[usize::from(pair[0] != u32::MAX)] = t as u32;
+                pair[usize::from(pair[0] != NONE)] = t as u32;
             }
         }
-        let mut node_triangle = vec![0; nodes.len()];
+        let mut node_triangle = vec![NONE; nodes.len()];
         for (t, triangle) in triangles.iter().enumerate() {
             triangle.iter().for_each(|&n| node_triangle[index_of_node[n as usize] as usize] = t as u32);
         }
+        let mut is_thin = vec![true; nodes.len()];
+        triangles[..closed]
+            .iter()
+            .flatten()
+            .for_each(|&n| is_thin[index_of_node[n as usize] as usize] = false);
         let length = |e: &[u32; 2]| (rest[e[0] as usize] - rest[e[1] as usize]).norm();
         let mean_edge = edges.iter().map(length).sum::<f64>() / edges.len().max(1) as f64;
         Self {
             triangles,
+            closed,
             nodes,
             edges,
             triangle_edges,
             edge_triangles,
             node_triangle,
+            is_thin,
             index_of_node,
             mean_edge,
         }
+    }
+
+    /// Whether all of it bounds solids.
+    pub fn is_closed(&self) -> bool {
+        !self.is_thin.iter().any(|thin| *thin) && self.closed == self.triangles.len()
     }
 }
 
@@ -112,7 +139,7 @@ mod tests {
     fn surface_of_a_cuboid_is_closed_and_encloses_its_volume() {
         let mesh = TetMesh::cuboid([0.5, 0.3, 0.2], [4, 3, 2]).unwrap();
         let rest: Vec<Vec3> = mesh.vertices().iter().map(|&v| v.into()).collect();
-        let surface = Surface::new(mesh.tetrahedra(), &rest);
+        let surface = Surface::new(mesh.tetrahedra(), &[], &[], &rest);
         assert_eq!(surface.triangles.len(), 2 * 2 * (4 * 3 + 3 * 2 + 4 * 2));
         // Euler: V − E + F = 2.
         let euler = surface.nodes.len() as i64 - surface.edges.len() as i64 + surface.triangles.len() as i64;

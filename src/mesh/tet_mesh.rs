@@ -12,8 +12,8 @@ const FLAT: f64 = 1.0e-9;
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// No tetrahedra at all.
-    #[error("the mesh has no tetrahedra")]
+    /// No elements at all.
+    #[error("the mesh has no elements")]
     Empty,
     /// A coordinate is NaN or infinite.
     #[error("vertex {vertex} is not finite: {position:?}")]
@@ -33,7 +33,7 @@ pub enum MeshError {
         /// Number of vertices.
         vertices: usize,
     },
-    /// A triangle of a surface to be filled points outside the vertex list.
+    /// A triangle of a surface to be filled, or of a sheet, points outside the vertex list.
     #[error("triangle {triangle} refers to vertex {vertex}, but there are {vertices} vertices")]
     TriangleOutOfRange {
         /// Index of the triangle.
@@ -50,6 +50,50 @@ pub enum MeshError {
         tet: usize,
         /// The repeated vertex.
         vertex: u32,
+    },
+    /// A triangle of a sheet names a vertex twice.
+    #[error("triangle {triangle} names vertex {vertex} twice")]
+    RepeatedInTriangle {
+        /// Index of the triangle.
+        triangle: usize,
+        /// The repeated vertex.
+        vertex: u32,
+    },
+    /// A triangle of a sheet without area to speak of.
+    #[error("triangle {triangle} is flat (area {area:e} m² with a longest edge of {edge:e} m)")]
+    FlatTriangle {
+        /// Index of the triangle.
+        triangle: usize,
+        /// Its area \[m²\].
+        area: f64,
+        /// Its longest edge \[m\].
+        edge: f64,
+    },
+    /// A rod or spring ends outside the vertex list.
+    #[error("the edge {ends:?} refers to vertex {vertex}, but there are {vertices} vertices")]
+    EndOutOfRange {
+        /// Vertices of the edge.
+        ends: [u32; 2],
+        /// The index that is out of range.
+        vertex: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// A rod or spring without length to speak of.
+    #[error("the edge {ends:?} has no length ({length:e} m)")]
+    ShortEdge {
+        /// Vertices of the edge.
+        ends: [u32; 2],
+        /// Its length \[m\].
+        length: f64,
+    },
+    /// A thickness, radius or cross-section that is not a positive number.
+    #[error("{quantity} is {value}, but must be positive and finite")]
+    BadSize {
+        /// What was given.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
     },
     /// Negative orientation.
     #[error("tetrahedron {tet} is inverted (signed volume {volume:e} m³)")]

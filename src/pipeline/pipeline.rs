@@ -389,12 +389,9 @@ fn store(
     counters: &mut DeformableCounters,
 ) {
     let problem = &work.island.bodies[local];
-    for ((v, x), (new, old)) in
-        body.state.v.iter_mut().zip(&mut body.state.x).zip(problem.current.x.iter().zip(&problem.x_start))
-    {
-        *v = (new - old) / h;
-        *x = *new;
-    }
+    let in_flight = work.island.contacts.active() == 0;
+    problem.end_velocities(in_flight, &mut body.state.v);
+    body.state.x.clone_from(&problem.current.x);
     for (k, pin) in body.pins.iter_mut().enumerate() {
         pin.force = problem.pin_force(k);
     }

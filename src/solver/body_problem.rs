@@ -8,8 +8,8 @@ use super::effort::{Effort, timed};
 use super::factor_cache::{FactorId, SystemFactor};
 use super::metric::Metric;
 use super::system::FactorKey;
-use crate::body::elastic::{self, StiffnessDamping};
-use crate::body::{DeformableBody, DeformableModel, Frames, SolverSettings, SystemMatrix};
+use crate::body::elastic::{self, Elements, StiffnessDamping};
+use crate::body::{DeformableBody, DeformableModel, Frames, Solver, SolverSettings, SystemMatrix};
 use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3, rotation_from_vector, skew};
 use std::sync::Arc;
@@ -23,6 +23,9 @@ const FRAME_ERROR: f64 = 1.0e-4;
 /// Largest turn \[rad\] that [`BodyProblem::balance`] takes for the rest of an iteration.
 const MAX_BALANCING_TURN: f64 = 0.1;
 
+/// Largest rotation \[rad\] in a step that [`BodyProblem::end_velocities`] gives back.
+const MAX_SPIN_GIVEN: f64 = 0.5;
+
 /// A body's step in the making.
 pub(crate) struct BodyProblem {
     pub key: FactorKey,
@@ -31,6 +34,7 @@ pub(crate) struct BodyProblem {
     pub model: Arc<DeformableModel>,
     pub settings: SolverSettings,
     material: DeformableMaterial,
+    activation: f64,
     h: f64,
     /// Positions at the start of the step.
     pub x_start: Vec<Vec3>,
@@ -83,6 +87,7 @@ impl BodyProblem {
             model: body.model.clone(),
             settings: *body.settings(),
             material: body.material,
+            activation: body.activation,
             h,
             x_start: Vec::new(),
             v_start: Vec::new(),
@@ -112,6 +117,7 @@ impl BodyProblem {
         self.key.update(body, h);
         self.settings = *body.settings();
         self.material = body.material;
+        self.activation = body.activation;
         self.h = h;
         self.scaling = 1.0;
         self.guard_retries = 0;
@@ -170,22 +176,39 @@ impl BodyProblem {
         self.choose_frames(&turned, factor);
     }
 
+    /// What is elastic in the body.
+    pub fn elements(&self) -> Elements<'_> {
+        Elements { model: &self.model, material: &self.material, activation: self.activation }
+    }
+
+    /// The step \[s\].
+    pub fn h(&self) -> f64 {
+        self.h
+    }
+
     fn choose_frames(&mut self, turned: &Mat3, factor: &SystemFactor) {
-        if factor.system == SystemMatrix::Laplacian {
-            return self.metric.set_isotropic();
+        // The Hessian is that of the world.
+        if self.settings.solver == Solver::Newton {
+            return self.metric.set_floating(&Mat3::identity());
         }
-        let per_node = match self.settings.frames {
-            Frames::Floating => false,
-            Frames::PerNode => true,
-            Frames::Automatic => self.current.least_trace < 1.0 + 2.0 * FLOATING_LIMIT.cos(),
-        };
+        let mobility = self.h * self.h / (1.0 + self.material.mass_damping * self.h);
+        let is_free = self.key.pins.is_empty();
+        let per_node = factor.system != SystemMatrix::Laplacian
+            && match self.settings.frames {
+                Frames::Floating => false,
+                Frames::PerNode => true,
+                Frames::Automatic => self.current.least_trace < 1.0 + 2.0 * FLOATING_LIMIT.cos(),
+            };
         if per_node {
-            let mobility = self.h * self.h / (1.0 + self.material.mass_damping * self.h);
             let (x, masses) = (&self.current.x, &self.masses);
-            let is_free = self.key.pins.is_empty();
-            self.metric.set_per_node(&self.model, x, masses, mobility, is_free, factor);
-        } else {
-            self.metric.set_floating(turned);
+            return self.metric.set_per_node(&self.model, x, masses, mobility, is_free, factor);
+        }
+        match factor.system {
+            SystemMatrix::Laplacian => self.metric.set_isotropic(),
+            SystemMatrix::RestStiffness => self.metric.set_floating(turned),
+        }
+        if is_free && factor.factor.is_rough() {
+            self.metric.deflate(&self.masses, mobility, factor);
         }
     }
 
@@ -193,7 +216,9 @@ impl BodyProblem {
     /// against its free motion; true if it did. The rest stiffness in a frame that is off by θ resists
     /// rotation with θ² of its stiffness.
     pub fn refresh_frame(&mut self) -> bool {
-        if self.metric.is_per_node() || self.key.system == SystemMatrix::Laplacian {
+        let has_no_frame =
+            self.key.system == SystemMatrix::Laplacian || self.settings.solver == Solver::Newton;
+        if self.metric.is_per_node() || has_no_frame {
             return false;
         }
         let (turned, _, _) = elastic::floating_frame(&self.model, &self.current.x);
@@ -279,6 +304,41 @@ impl BodyProblem {
         x.iter_mut().for_each(|x| *x = centre + shift + rotation * (*x - centre));
     }
 
+    /// Velocities at the end of the step [m/s]; `in_flight` tells that nothing touched or tied the body. Implicit
+    /// Euler then loses angular momentum that nothing has taken: a rotation about the centre of mass puts
+    /// it back.
+    pub fn end_velocities(&self, in_flight: bool, v: &mut Vec<Vec3>) {
+        v.clear();
+        v.extend(self.current.x.iter().zip(&self.x_start).map(|(new, old)| (new - old) / self.h));
+        if !(in_flight && self.settings.keeps_spin && self.key.pins.is_empty()) {
+            return;
+        }
+        let total: f64 = self.masses.iter().sum();
+        let mean = |p: &[Vec3]| p.iter().zip(&self.masses).map(|(p, m)| p * *m).sum::<Vec3>() / total;
+        let centre = mean(&self.current.x);
+        let (start, start_velocity) = (mean(&self.x_start), mean(&self.v_start));
+        let inertial = |i: usize| self.target[i] - self.x_start[i] - self.v_start[i] * self.h;
+        let (mut kept, mut gained, mut lost) = (Vec3::zeros(), Vec3::zeros(), Vec3::zeros());
+        let mut inertia = Mat3::zeros();
+        for (i, m) in self.masses.iter().enumerate() {
+            let (arm, before) = (self.current.x[i] - centre, self.x_start[i] - start);
+            kept += before.cross(&(self.v_start[i] - start_velocity)) * *m;
+            // External forces act where the nodes are at the end of the step, as in the step itself.
+            gained += arm.cross(&inertial(i)) * (*m / self.h);
+            lost += arm.cross(&v[i]) * *m;
+            inertia += (Mat3::identity() * arm.norm_squared() - arm * arm.transpose()) * *m;
+        }
+        let drag = 1.0 + self.material.mass_damping * self.h;
+        let missing = (kept + gained) / drag - lost;
+        let Some(turn) = inertia.try_inverse().map(|inverse| inverse * missing) else { return };
+        // What has no width about some axis has no spin about it, but for roundings.
+        if turn.norm() * self.h < MAX_SPIN_GIVEN {
+            for (v, x) in v.iter_mut().zip(&self.current.x) {
+                *v += turn.cross(&(x - centre));
+            }
+        }
+    }
+
     /// Pinned nodes are rows of the identity in A, without neighbours: what the solve says of them
     /// is no motion.
     fn add_step(&mut self) {
@@ -319,10 +379,11 @@ impl BodyProblem {
     fn evaluate(&mut self, at: &mut Iterate) {
         at.r.clear();
         at.r.resize(at.x.len(), Vec3::zeros());
-        let (model, material, damping) = (&self.model, &self.material, &self.damping);
+        let (model, material, activation) = (&*self.model, &self.material, self.activation);
+        let elements = Elements { model, material, activation };
         let time = &mut self.metric.effort.element_time;
         let elastic =
-            timed(time, || elastic::add_forces(model, material, damping, &at.x, &self.frame, &mut at.r));
+            timed(time, || elastic::add_forces(&elements, &self.damping, &at.x, &self.frame, &mut at.r));
         at.least_trace = elastic.least_trace;
         at.internal = at.r.iter().map(|f| f.amax()).fold(0.0, f64::max);
         let (inertia, drag) = (1.0 / (self.h * self.h), self.material.mass_damping / self.h);
@@ -334,7 +395,7 @@ impl BodyProblem {
             kinetic += m * (inertia * from_target.norm_squared() + drag * moved.norm_squared());
         }
         at.objective = elastic.energy + 0.5 * kinetic;
-        self.metric.effort.elements += self.model.tetrahedra.len();
+        self.metric.effort.elements += self.model.element_count();
     }
 
     /// The guard [cf. Nocedal & Wright 2006, sufficient decrease]:

@@ -8,8 +8,8 @@ use super::body_problem::BodyProblem;
 use super::cone_newton::{ConeProblem, ConeSolver, ConeTolerance, ConeWork};
 use super::contact_groups::ContactGroups;
 use super::delassus::{ContactRows, Delassus, steady_geometry};
-use super::factor_cache::FactorCache;
 use super::partner::{Partners, Reaction};
+use super::tangent::Factors;
 use crate::body::{ContactGeometry, ContactMemory};
 use crate::contact::{Law, Row, Side};
 use crate::math::Vec3;
@@ -144,7 +144,7 @@ impl ContactSystem {
 
     /// Assembles W for the current frames and scalings of the bodies, unless the last one was made of
     /// the same bits: so it is at rest.
-    pub fn assemble(&mut self, bodies: &[BodyProblem], factors: &FactorCache, partners: &Partners, h: f64) {
+    pub fn assemble(&mut self, bodies: &[BodyProblem], factors: Factors<'_>, partners: &Partners, h: f64) {
         let rows = ContactRows {
             rows: &self.rows[..self.active],
             geometry: &self.geometry,

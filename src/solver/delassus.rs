@@ -4,8 +4,8 @@
 use super::block_matrix::BlockMatrix;
 use super::body_problem::BodyProblem;
 use super::contact_groups::ContactGroups;
-use super::factor_cache::FactorCache;
 use super::partner::{Articulation, Partner, Partners, stacked};
+use super::tangent::Factors;
 use crate::body::ContactGeometry;
 use crate::contact::{PartnerId, Row, Side};
 use crate::math::{Mat3, Vec3};
@@ -59,7 +59,7 @@ impl Delassus {
         W: &mut BlockMatrix,
         contacts: &ContactRows<'_>,
         bodies: &[BodyProblem],
-        factors: &FactorCache,
+        factors: Factors<'_>,
         partners: &Partners,
         h: f64,
     ) -> bool {
@@ -191,7 +191,7 @@ impl Lever {
 /// What the levers act on.
 struct Between<'a> {
     bodies: &'a [BodyProblem],
-    factors: &'a FactorCache,
+    factors: Factors<'a>,
     partners: &'a Partners,
 }
 
@@ -214,8 +214,8 @@ impl Between<'_> {
                 Lever::Soft { body: j, count: n, nodes: nodes_b, places: places_b, directions: directions_b },
             ) if i == j => {
                 let body = &self.bodies[*i];
-                let columns = &self.factors.get(body.factor).columns;
-                let has_one_frame = !body.metric.is_per_node();
+                let columns = &self.factors.of(*i, body).columns;
+                let has_one_frame = body.metric.one_frame().is_some();
                 for l in 0..*n {
                     for k in 0..*m {
                         let mut block = columns.block(places[k], places_b[l]);
@@ -262,18 +262,18 @@ impl Ingredients {
         &mut self,
         contacts: &ContactRows<'_>,
         bodies: &[BodyProblem],
-        factors: &FactorCache,
+        factors: Factors<'_>,
         partners: &Partners,
         h: f64,
     ) {
         self.bits.clear();
         self.nodes.clear();
         self.factors.clear();
-        self.comparable = bodies.iter().all(|b| !b.metric.is_per_node());
+        self.comparable = bodies.iter().all(|b| b.metric.one_frame().is_some());
         if !self.comparable {
             return;
         }
-        self.factors.extend(bodies.iter().map(|b| factors.get(b.factor).serial));
+        self.factors.extend(bodies.iter().enumerate().map(|(i, b)| factors.of(i, b).serial));
         self.bits.push(h);
         for articulation in &partners.articulations {
             self.bits.extend(articulation.blocks.iter().flat_map(|b| b.iter()));

@@ -3,6 +3,7 @@
 //! All solves are sequential (`Par::Seq`): faer's threads cost more than small supernodes are
 //! worth, and parallelism is over bodies. Everything works in memory the caller owns.
 
+use super::sweeps::{ConjugateScratch, UpperTriangle};
 use super::triangular::{Entry, Supernodes, Values};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
@@ -39,6 +40,12 @@ pub(crate) enum Factor {
     /// Computed in double precision, then rounded: what it solves is a matrix that differs from A by
     /// 6e-8 of its norm, with half the bytes to read.
     Single(Values<f32>),
+    /// No factor but what stands in for one.
+    Jacobi(Vec<f64>),
+    /// The matrix itself, with a sweep of Gauss–Seidel for its inverse.
+    GaussSeidel(Vec<f64>),
+    /// The matrix itself, solved by conjugate gradients.
+    Iterative(Vec<f64>),
 }
 
 impl Factor {
@@ -46,14 +53,22 @@ impl Factor {
     pub fn rounded(self) -> Self {
         match self {
             Self::Double(values) => Self::Single(values.rounded()),
-            single => single,
+            other => other,
         }
+    }
+
+    /// Whether it only stands in for the inverse.
+    pub fn is_rough(&self) -> bool {
+        matches!(self, Self::Jacobi(_) | Self::GaussSeidel(_))
     }
 
     pub fn bytes(&self) -> usize {
         match self {
             Self::Double(values) => values.bytes(),
             Self::Single(values) => values.bytes(),
+            Self::Jacobi(values) | Self::GaussSeidel(values) | Self::Iterative(values) => {
+                size_of_val(values.as_slice())
+            }
         }
     }
 }
@@ -66,6 +81,7 @@ pub(crate) struct FactorScratch {
     ordered: Vec<f64>,
     gathered: Vec<f64>,
     panel: Vec<f64>,
+    conjugate: ConjugateScratch,
 }
 
 /// The matrix is not positive definite, or not finite.
@@ -139,13 +155,42 @@ impl Symbolic {
         match factor {
             Factor::Double(values) => self.supernodes.solve(values, x, &mut scratch.gathered),
             Factor::Single(values) => self.supernodes.solve(values, x, &mut scratch.gathered),
+            _ => {
+                let mut own = std::mem::take(&mut scratch.ordered);
+                own.clear();
+                own.extend(self.places.iter().map(|&place| x[place]));
+                self.solve_without(factor, &mut own, scratch);
+                self.places.iter().zip(&own).for_each(|(&place, v)| x[place] = *v);
+                scratch.ordered = own;
+            }
         }
+    }
+
+    /// Without a factor, in the unknowns' own order.
+    fn solve_without(&self, factor: &Factor, x: &mut [f64], scratch: &mut FactorScratch) {
+        match factor {
+            Factor::Double(_) | Factor::Single(_) => {}
+            Factor::Jacobi(inverse) => x.iter_mut().zip(inverse).for_each(|(x, d)| *x *= d),
+            Factor::GaussSeidel(values) => self.upper(values).sweep(x),
+            Factor::Iterative(values) => self.upper(values).conjugate_gradients(x, &mut scratch.conjugate),
+        }
+    }
+
+    /// The matrix of these values.
+    pub fn upper<'a>(&'a self, values: &'a [f64]) -> UpperTriangle<'a> {
+        UpperTriangle { starts: self.column_starts(), rows: self.rows(), values }
     }
 
     /// Solves for many columns at once, one after the other in their own order, of which most numbers may
     /// be zero.
     pub fn solve_batch(&self, factor: &Factor, rhs: &mut [f64], columns: usize, scratch: &mut FactorScratch) {
         let n = self.order.len();
+        if !matches!(factor, Factor::Double(_) | Factor::Single(_)) {
+            for column in rhs.chunks_exact_mut(n).filter(|c| c.iter().any(|v| *v != 0.0)) {
+                self.solve_without(factor, column, scratch);
+            }
+            return;
+        }
         let mut ordered = std::mem::take(&mut scratch.ordered);
         ordered.clear();
         for column in rhs.chunks_exact(n) {
@@ -154,6 +199,7 @@ impl Symbolic {
         match factor {
             Factor::Double(values) => self.solve_panels(&values.L, &mut ordered, columns, scratch),
             Factor::Single(values) => self.solve_panels(&values.L, &mut ordered, columns, scratch),
+            _ => {}
         }
         for (column, x) in rhs.chunks_exact_mut(n).zip(ordered.chunks_exact(n)) {
             for (&old, x) in self.order.iter().zip(x) {

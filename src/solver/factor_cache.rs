@@ -6,7 +6,7 @@
 use super::columns::Columns;
 use super::factor::{BATCH, Factor, FactorScratch, Symbolic};
 use super::system::{self, FactorKey};
-use crate::body::{DeformableBody, DeformableModel, SystemMatrix};
+use crate::body::{DeformableBody, DeformableModel, Solver, SystemMatrix};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -16,8 +16,13 @@ pub(crate) struct SystemFactor {
     pub factor: Factor,
     pub system: SystemMatrix,
     pub columns: Columns,
-    /// Different for every factor that a cache has made.
+    /// Different for every factor that a cache, or an island, has made.
     pub serial: u64,
+}
+
+/// A factor that is kept.
+struct Entry {
+    made: SystemFactor,
     key: FactorKey,
     model: Arc<DeformableModel>,
     last_used: u64,
@@ -31,7 +36,7 @@ pub(crate) struct FactorId(usize);
 #[derive(Default)]
 pub(crate) struct FactorCache {
     symbolic: HashMap<(u64, SystemMatrix), Arc<Symbolic>>,
-    factors: Vec<SystemFactor>,
+    factors: Vec<Entry>,
     places: HashMap<FactorKey, usize>,
     scratch: FactorScratch,
     ages: Vec<u64>,
@@ -69,12 +74,12 @@ impl FactorCache {
             self.forget_before(cutoff);
         }
         while self.column_bytes() > column_budget {
-            let idle = |f: &&mut SystemFactor| f.columns.bytes() > 0;
+            let idle = |f: &&mut Entry| f.made.columns.bytes() > 0;
             let Some(oldest) = self.factors.iter_mut().filter(idle).min_by_key(|f| (f.last_used, f.model.id))
             else {
                 return;
             };
-            oldest.columns.clear();
+            oldest.made.columns.clear();
         }
     }
 
@@ -109,17 +114,21 @@ impl FactorCache {
                 }
             };
             let values = system::assemble(&body.model, &body.material, &key.pins, key.system, h, &symbolic);
-            let mut factor = symbolic.factorize(&values, &mut self.scratch).ok()?;
-            if system::in_single_precision(body, h, &symbolic, &values) {
-                factor = factor.rounded();
-            }
+            let factor = match key.solver {
+                Solver::Projective => {
+                    let factor = symbolic.factorize(&values, &mut self.scratch).ok()?;
+                    let is_single = system::in_single_precision(body, h, &symbolic, &values);
+                    if is_single { factor.rounded() } else { factor }
+                }
+                Solver::ConjugateGradients => Factor::Iterative(values),
+                Solver::GaussSeidel => Factor::GaussSeidel(values),
+                // Newton's method makes its own, and falls back on this.
+                Solver::Jacobi | Solver::Newton => Factor::Jacobi(symbolic.upper(&values).inverse_row_sums()),
+            };
             work.factorizations = 1;
-            let made = SystemFactor {
-                symbolic,
-                factor,
-                system: key.system,
-                columns: Columns::new(&body.model.surface, key.system),
-                serial: self.made,
+            let columns = Columns::new(&body.model.surface, key.system);
+            let made = Entry {
+                made: SystemFactor { symbolic, factor, system: key.system, columns, serial: self.made },
                 key: key.clone(),
                 model: body.model.clone(),
                 last_used: self.step,
@@ -131,7 +140,7 @@ impl FactorCache {
         work.id = FactorId(*self.places.get(key)?);
         let entry = &mut self.factors[work.id.0];
         entry.last_used = self.step;
-        let SystemFactor { symbolic, factor, columns, model, .. } = entry;
+        let Entry { made: SystemFactor { symbolic, factor, columns, .. }, model, .. } = entry;
         work.columns = columns.prepare(model, &key.pins, symbolic, factor, surface_nodes, &mut self.scratch);
         Some(work)
     }
@@ -139,7 +148,8 @@ impl FactorCache {
     /// Makes the columns of the first of these surface nodes that have none: one batch of them, so that
     /// a coming touch finds them there. Returns how many.
     pub fn prepare_ahead(&mut self, id: FactorId, pins: &[u32], surface_nodes: &[u32]) -> usize {
-        let SystemFactor { symbolic, factor, columns, model, system, .. } = &mut self.factors[id.0];
+        let Entry { made, model, .. } = &mut self.factors[id.0];
+        let SystemFactor { symbolic, factor, columns, system, .. } = made;
         let missing = surface_nodes.iter().copied().filter(|s| !columns.has(*s));
         let batch: Vec<u32> = missing.take(BATCH / system::dimension(*system)).collect();
         columns.prepare(model, pins, symbolic, factor, batch.into_iter(), &mut self.scratch)
@@ -147,16 +157,16 @@ impl FactorCache {
 
     /// A factor that was prepared in this step.
     pub fn get(&self, id: FactorId) -> &SystemFactor {
-        &self.factors[id.0]
+        &self.factors[id.0].made
     }
 
     /// Bytes of all numeric factors.
     pub fn factor_bytes(&self) -> usize {
-        self.factors.iter().map(|f| f.factor.bytes()).sum()
+        self.factors.iter().map(|f| f.made.factor.bytes()).sum()
     }
 
     /// Bytes of all columns.
     pub fn column_bytes(&self) -> usize {
-        self.factors.iter().map(|f| f.columns.bytes()).sum()
+        self.factors.iter().map(|f| f.made.columns.bytes()).sum()
     }
 }

@@ -6,14 +6,15 @@
 //! (A → cA) and the iteration done again, contact problem included: shortening the step instead would
 //! break the contacts that were just solved.
 
+use super::accelerator::Accelerator;
 use super::body_problem::BodyProblem;
 use super::cone_newton::ConeTolerance;
 use super::contact_system::{ContactLimits, ContactSystem};
 use super::effort::{Effort, timed};
 use super::factor_cache::FactorCache;
-use super::lbfgs::Lbfgs;
 use super::partner::Partners;
-use crate::body::Acceleration;
+use super::tangent::{Factors, Tangents};
+use crate::body::{Acceleration, Solver};
 
 /// Bodies whose steps depend on one another.
 #[derive(Default)]
@@ -21,8 +22,9 @@ pub(crate) struct Island {
     pub bodies: Vec<BodyProblem>,
     pub contacts: ContactSystem,
     pub report: IslandReport,
-    accelerations: Vec<Lbfgs>,
+    accelerations: Vec<Accelerator>,
     assembly: Assembly,
+    tangents: Tangents,
 }
 
 /// What is to be done to the contact problem before it is solved.
@@ -72,13 +74,14 @@ impl Island {
     /// contacts' forces.
     pub fn solve(&mut self, factors: &FactorCache, partners: &Partners, h: f64, limits: &ContactLimits) {
         self.report = IslandReport::default();
+        self.tangents.begin(self.bodies.len());
         for body in &mut self.bodies {
             body.choose_start(factors.get(body.factor));
         }
         self.contacts.begin(&mut self.bodies, partners, h, limits);
         self.assembly = Assembly::Anew;
-        self.accelerations.resize_with(self.bodies.len(), Lbfgs::default);
-        self.accelerations.iter_mut().for_each(Lbfgs::clear);
+        self.accelerations.resize_with(self.bodies.len(), Accelerator::default);
+        self.accelerations.iter_mut().for_each(Accelerator::clear);
         let iterations = self.bodies.iter().map(|b| b.settings.max_iterations).max().unwrap_or(0);
         for _ in 0..iterations {
             self.report.iterations += 1;
@@ -114,15 +117,17 @@ impl Island {
         h: f64,
         limits: &ContactLimits,
     ) -> Outcome {
+        if self.tangents.refresh(&mut self.bodies, factors, &self.contacts.rows) {
+            self.assembly = self.assembly.max(Assembly::Refreshed);
+        }
         let mut outcome;
         loop {
             outcome = Outcome::Descended;
-            for (body, lbfgs) in self.bodies.iter_mut().zip(&mut self.accelerations) {
-                let factor = factors.get(body.factor);
-                match acceleration_of(body, &self.contacts) {
-                    Acceleration::Lbfgs { window } => lbfgs.step(window, body, factor),
-                    Acceleration::None => body.free_step(factor),
-                }
+            let own = Factors { cache: factors, tangents: &self.tangents };
+            let bodies = self.bodies.iter_mut().zip(&mut self.accelerations);
+            for (index, (body, acceleration)) in bodies.enumerate() {
+                let kind = acceleration_of(body, &self.contacts);
+                acceleration.step(kind, body, own.of(index, body));
             }
             if !self.contacts.is_empty() {
                 self.solve_contacts(factors, partners, h, limits);
@@ -166,9 +171,7 @@ impl Island {
             }
         }
         for (body, acceleration) in self.bodies.iter_mut().zip(&mut self.accelerations) {
-            if acceleration_of(body, &self.contacts) != Acceleration::None {
-                acceleration.learn(body);
-            }
+            acceleration.learn(acceleration_of(body, &self.contacts), body);
             body.accept_trial();
         }
         outcome
@@ -182,6 +185,7 @@ impl Island {
         }
         let (contacts, bodies) = (&mut self.contacts, &self.bodies);
         let time = &mut self.report.effort.contact_time;
+        let factors = Factors { cache: factors, tangents: &self.tangents };
         timed(time, || contacts.assemble(bodies, factors, partners, h));
         if assembly == Assembly::Anew {
             self.contacts.expect();
@@ -214,8 +218,9 @@ impl Island {
             if !changed {
                 break;
             }
-            for body in &mut self.bodies {
-                body.contact_step(factors.get(body.factor));
+            let own = Factors { cache: factors, tangents: &self.tangents };
+            for (index, body) in self.bodies.iter_mut().enumerate() {
+                body.contact_step(own.of(index, body));
             }
         }
     }
@@ -224,6 +229,7 @@ impl Island {
 /// Bodies in contact that do not bend take the plain iteration: it needs two or three steps there,
 /// and a quasi-Newton update would feed the last digits of the contact forces back into them.
 fn acceleration_of(body: &BodyProblem, contacts: &ContactSystem) -> Acceleration {
-    let plain = !contacts.is_empty() && !body.metric.is_per_node();
+    let is_newton = body.settings.solver == Solver::Newton;
+    let plain = is_newton || (!contacts.is_empty() && !body.metric.is_per_node());
     if plain { Acceleration::None } else { body.settings.acceleration }
 }

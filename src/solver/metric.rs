@@ -64,6 +64,7 @@ impl Metric {
     /// The scalar matrix: no frames.
     pub fn set_isotropic(&mut self) {
         self.kind = FrameKind::Isotropic;
+        self.floating = Mat3::identity();
         self.deflation.active = false;
     }
 
@@ -82,7 +83,16 @@ impl Metric {
         // ‖R − Q‖ = 2√2 sin(θ/2).
         let differs = (rotation - self.floating).norm() > angle * std::f64::consts::SQRT_2;
         if differs {
+            let (before, active) = (self.floating, self.deflation.active);
             self.set_floating(rotation);
+            if active {
+                let turn = self.floating * before.transpose();
+                let d = &mut self.deflation;
+                d.coupling.iter_mut().for_each(|g| *g = turn * *g * turn.transpose());
+                d.mean = turn * d.mean * turn.transpose();
+                d.made_from.1 = vec![self.floating];
+                d.active = true;
+            }
         }
         differs
     }
@@ -102,17 +112,24 @@ impl Metric {
         self.per_node.resize(x.len(), Mat3::zeros());
         node_rotations(model, x, &mut self.per_node);
         self.per_node.iter_mut().for_each(|q| *q = rounded_rotation(q, FRAME_BITS));
-        self.deflation.active = is_free;
+        self.deflation.active = false;
         if is_free {
-            self.refresh_deflation(masses, mobility, factor);
+            self.deflate(masses, mobility, factor);
         }
     }
 
-    fn refresh_deflation(&mut self, masses: &[f64], mobility: f64, factor: &SystemFactor) {
-        let (serial, frames) = &self.deflation.made_from;
-        if *serial == Some(factor.serial) && *frames == self.per_node {
+    /// Puts the translation mode back, of free bodies with frames per node or without a factor.
+    pub fn deflate(&mut self, masses: &[f64], mobility: f64, factor: &SystemFactor) {
+        let frames = match self.kind {
+            FrameKind::PerNode => &self.per_node[..],
+            FrameKind::Isotropic | FrameKind::Floating => std::slice::from_ref(&self.floating),
+        };
+        let (serial, before) = &self.deflation.made_from;
+        if *serial == Some(factor.serial) && before == frames {
+            self.deflation.active = true;
             return;
         }
+        let frames = frames.to_vec();
         let mut d = std::mem::take(&mut self.deflation);
         d.coupling.clear();
         d.coupling.resize(masses.len(), Mat3::zeros());
@@ -127,8 +144,8 @@ impl Metric {
         }
         let mean = d.coupling.iter().zip(masses).fold(Mat3::zeros(), |sum, (g, m)| sum + g * *m);
         d.mean = (mean + mean.transpose()) * 0.5;
-        d.made_from.0 = Some(factor.serial);
-        d.made_from.1.clone_from(&self.per_node);
+        d.made_from = (Some(factor.serial), frames);
+        d.active = true;
         d.masses.clear();
         d.masses.extend_from_slice(masses);
         d.total_mass = masses.iter().sum();
@@ -210,9 +227,10 @@ impl Metric {
         block - (d.coupling[i] + d.coupling[j].transpose()) / d.total_mass + rigid
     }
 
-    /// The one frame of the body, if it has one.
+    /// The one frame of the body, if it has one and that is all there is to its blocks.
     pub fn one_frame(&self) -> Option<Mat3> {
         match self.kind {
+            _ if self.deflation.active => None,
             FrameKind::Isotropic => Some(Mat3::identity()),
             FrameKind::Floating => Some(self.floating),
             FrameKind::PerNode => None,

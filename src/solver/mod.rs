@@ -3,8 +3,11 @@
 //!
 //! Architecture invariant: nothing here knows rapier; only `factor.rs` names faer.
 
+mod accelerator;
+mod anderson;
 mod block_matrix;
 mod body_problem;
+mod chebyshev;
 mod columns;
 mod cone_hessian;
 mod cone_newton;
@@ -18,7 +21,9 @@ mod island;
 mod lbfgs;
 mod metric;
 mod partner;
+mod sweeps;
 mod system;
+mod tangent;
 #[cfg(test)]
 mod tests;
 mod triangular;

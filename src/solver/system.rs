@@ -1,25 +1,30 @@
 //! The constant matrix of the global step, assembled.
 //!
 //! Rest stiffness: `A = (1 + αh) M/h² + (1 + β/h) K₀`, `K₀_ab = Σ_e V[μ((g_a·g_b)I + g_b g_aᵀ) + λ g_a g_bᵀ]`.
-//! Laplacian: `A = (1 + αh) M/h² + (1 + β/h) Σ_e w V GᵀG` [Bouaziz et al. 2014].
+//! Laplacian: `A = (1 + αh) M/h² + (1 + β/h) Σ_e w V GᵀG` [Bouaziz et al. 2014]. Sheets, rods and
+//! springs are in both as in the latter. Newton's method has the Hessian at a state in its place.
 //! A pinned node has the identity for its row and column, so every set of pins shares one symbolic
 //! factor.
 
 use super::factor::Symbolic;
-use crate::body::{DeformableBody, DeformableModel, FactorPrecision, SystemMatrix};
+use crate::body::elastic::Elements;
+use crate::body::tangent::{add_tangents, add_thin_bounds};
+use crate::body::{DeformableBody, DeformableModel, FactorPrecision, Solver, SystemMatrix};
 use crate::energy::{ElementEnergy, with_energy};
 use crate::material::DeformableMaterial;
+use crate::math::lanes::LANES;
 use crate::math::{Mat3, Vec3};
 
 /// Everything a numeric factor depends on: it is valid for any body that agrees in all of it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct FactorKey {
     pub model: u64,
+    pub solver: Solver,
     pub system: SystemMatrix,
     precision: FactorPrecision,
     elasticity: crate::energy::Elasticity,
-    /// Bits of h, E, ν, ρ, α, β.
-    bits: [u64; 6],
+    /// Bits of h, E, ν, ρ, α, β, and the modulus of fibres.
+    bits: [u64; 7],
     /// Pinned nodes, ascending.
     pub pins: Vec<u32>,
 }
@@ -28,10 +33,11 @@ impl FactorKey {
     pub fn new(body: &DeformableBody, h: f64) -> Self {
         let mut key = Self {
             model: body.model.id,
+            solver: Solver::default(),
             system: SystemMatrix::default(),
             precision: FactorPrecision::default(),
             elasticity: body.material.elasticity,
-            bits: [0; 6],
+            bits: [0; 7],
             pins: Vec::new(),
         };
         key.update(body, h);
@@ -43,10 +49,14 @@ impl FactorKey {
         let m = &body.material;
         let [e, nu, rho] = [m.youngs_modulus, m.poisson_ratio, m.density];
         self.model = body.model.id;
-        self.system = body.settings().system;
+        self.solver = body.settings().solver;
+        self.system = match self.solver {
+            Solver::Newton => SystemMatrix::RestStiffness,
+            _ => body.settings().system,
+        };
         self.precision = body.settings().precision;
         self.elasticity = m.elasticity;
-        self.bits = [h, e, nu, rho, m.mass_damping, m.stiffness_damping].map(f64::to_bits);
+        self.bits = [h, e, nu, rho, m.mass_damping, m.stiffness_damping, m.fibre_modulus].map(f64::to_bits);
         self.pins.clear();
         self.pins.extend(body.pins.iter().map(|p| p.node));
     }
@@ -77,7 +87,7 @@ pub(crate) fn symbolic(model: &DeformableModel, system: SystemMatrix) -> Option<
     Symbolic::new(d * n, starts, rows)
 }
 
-/// The values of a body's matrix, in the order of [`Symbolic::rows`].
+/// The values of a body's constant matrix, in the order of [`Symbolic::rows`].
 pub(crate) fn assemble(
     model: &DeformableModel,
     material: &DeformableMaterial,
@@ -86,30 +96,17 @@ pub(crate) fn assemble(
     h: f64,
     symbolic: &Symbolic,
 ) -> Vec<f64> {
-    let d = dimension(system);
-    let mut values = vec![0.0; symbolic.rows().len()];
-    let mut matrix = Upper { symbolic, values: &mut values, d };
-    let mut pinned = vec![false; model.rest.len()];
-    pins.iter().for_each(|&p| pinned[p as usize] = true);
-    let inertia = material.density * (1.0 + material.mass_damping * h) / (h * h);
-    for (j, &volume) in model.node_volumes.iter().enumerate() {
-        let diagonal = if pinned[j] { 1.0 } else { inertia * volume };
-        matrix.add(j, j, &Mat3::from_diagonal_element(diagonal));
-    }
+    let mut matrix = Upper::new(model, material, pins, system, h, symbolic);
     let stiffening = 1.0 + material.stiffness_damping / h;
     let lame = material.lame();
     let weight = with_energy!(material, energy => energy.laplacian_weight());
-    for (e, tet) in model.tetrahedra.iter().enumerate() {
-        let block = &model.blocks[e / crate::math::lanes::LANES];
-        let lane = e % crate::math::lanes::LANES;
+    for (e, tet) in model.tetrahedra.iter().enumerate().take(LANES * model.blocks.len()) {
+        let block = &model.blocks[e / LANES];
+        let lane = e % LANES;
         let g: [Vec3; 4] = block.shape_gradients(lane);
         let volume = block.volumes.0[lane] * stiffening;
         for a in 0..4 {
             for b in 0..4 {
-                let (i, j) = (tet[a] as usize, tet[b] as usize);
-                if i < j || pinned[i] || pinned[j] {
-                    continue;
-                }
                 let stiffness = match system {
                     SystemMatrix::Laplacian => Mat3::from_diagonal_element(weight * g[a].dot(&g[b])),
                     SystemMatrix::RestStiffness => {
@@ -117,11 +114,32 @@ pub(crate) fn assemble(
                             + g[a] * g[b].transpose() * lame.lambda
                     }
                 };
-                matrix.add(i, j, &(stiffness * volume));
+                matrix.add_elastic(tet[a] as usize, tet[b] as usize, &(stiffness * volume));
             }
         }
     }
-    values
+    let elements = Elements { model, material, activation: 1.0 };
+    add_thin_bounds(&elements, |i, j, k| {
+        matrix.add_elastic(i, j, &Mat3::from_diagonal_element(k * stiffening));
+    });
+    matrix.values
+}
+
+/// The values of a body's Hessian at `x`, in the order of [`Symbolic::rows`], of `3n` unknowns. Of stiffness
+/// damping it has the leading part, β/h of the elastic one.
+pub(crate) fn assemble_tangent(
+    elements: &Elements<'_>,
+    x: &[Vec3],
+    projected: bool,
+    pins: &[u32],
+    h: f64,
+    symbolic: &Symbolic,
+) -> Vec<f64> {
+    let Elements { model, material, .. } = elements;
+    let mut matrix = Upper::new(model, material, pins, SystemMatrix::RestStiffness, h, symbolic);
+    let stiffening = 1.0 + material.stiffness_damping / h;
+    add_tangents(elements, x, projected, |i, j, block| matrix.add_elastic(i, j, &(block * stiffening)));
+    matrix.values
 }
 
 /// Condition up to which a single-precision factor serves by itself: the softest mode is then off by
@@ -168,23 +186,53 @@ fn condition(body: &DeformableBody, h: f64, symbolic: &Symbolic, values: &[f64])
 /// The upper triangle being filled, block by block.
 struct Upper<'a> {
     symbolic: &'a Symbolic,
-    values: &'a mut [f64],
+    values: Vec<f64>,
+    pinned: Vec<bool>,
     d: usize,
 }
 
-impl Upper<'_> {
+impl<'a> Upper<'a> {
+    /// With the inertia in it, and the identity for pinned nodes.
+    fn new(
+        model: &DeformableModel,
+        material: &DeformableMaterial,
+        pins: &[u32],
+        system: SystemMatrix,
+        h: f64,
+        symbolic: &'a Symbolic,
+    ) -> Self {
+        let mut pinned = vec![false; model.rest.len()];
+        pins.iter().for_each(|&p| pinned[p as usize] = true);
+        let values = vec![0.0; symbolic.rows().len()];
+        let mut matrix = Self { symbolic, values, pinned, d: dimension(system) };
+        let inertia = material.density * (1.0 + material.mass_damping * h) / (h * h);
+        for (j, &volume) in model.node_volumes.iter().enumerate() {
+            let diagonal = if matrix.pinned[j] { 1.0 } else { inertia * volume };
+            matrix.add(j, j, &Mat3::from_diagonal_element(diagonal));
+        }
+        matrix
+    }
+
+    /// Adds a block between nodes i and j if it is one of the lower triangle and neither is pinned.
+    fn add_elastic(&mut self, i: usize, j: usize, block: &Mat3) {
+        if i >= j && !self.pinned[i] && !self.pinned[j] {
+            self.add(i, j, block);
+        }
+    }
+
     /// Adds the block between row node i and column node j ≤ i of the symmetric matrix, where it
     /// stands above the diagonal: transposed.
     fn add(&mut self, i: usize, j: usize, block: &Mat3) {
         let d = self.d;
         let starts = self.symbolic.column_starts();
+        // The block stands at the same place in all of its columns.
+        let first = starts[d * i]..starts[d * i + 1];
+        let Ok(place) = self.symbolic.rows()[first].binary_search(&(d * j)) else { return };
         for r in 0..d {
-            let column = starts[d * i + r]..starts[d * i + r + 1];
-            let rows = &self.symbolic.rows()[column.clone()];
-            let Ok(place) = rows.binary_search(&(d * j)) else { continue };
+            let column = starts[d * i + r] + place;
             let count = if i == j { r + 1 } else { d };
             for c in 0..count {
-                self.values[column.start + place + c] += block[(r, c)];
+                self.values[column + c] += block[(r, c)];
             }
         }
     }

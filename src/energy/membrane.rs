@@ -1,0 +1,205 @@
+//! Triangles that stretch: corotated elasticity in plane stress, `Ψ = μ‖F − R‖² + λ̄/2·tr²(RᵀF − I)` with
+//! the 3×2 deformation gradient F, its polar factor R and λ̄ = 2μλ/(λ + 2μ), so that a sheet under
+//! tension is thinned by Poisson's ratio as the solid it is cut from.
+
+use super::strain_limit::excess;
+use crate::material::{DeformableMaterial, Lame};
+use crate::math::{Mat2, Mat3x2, Vec3};
+
+/// The energy of a sheet's triangles.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Membrane {
+    mu: f64,
+    lambda: f64,
+    limits: Option<[f64; 2]>,
+    limit_weight: f64,
+}
+
+/// What a triangle answers to its deformation.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MembraneResponse {
+    /// [J/m³].
+    pub density: f64,
+    /// `∂density/∂F` \[Pa\].
+    pub stress: Mat3x2,
+}
+
+/// A mode of the Hessian, as [`super::Mode`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MembraneMode {
+    pub stiffness: f64,
+    pub shape: Mat3x2,
+}
+
+/// Areas below this part of the squared lengths count as none.
+const COLLAPSED: f64 = 1.0e-9;
+
+impl Membrane {
+    pub fn new(material: &DeformableMaterial) -> Self {
+        let Lame { mu, lambda } = material.lame();
+        let lambda = 2.0 * mu * lambda / (lambda + 2.0 * mu);
+        Self { mu, lambda, limits: material.strain_limits, limit_weight: material.limit_weight() }
+    }
+
+    pub fn evaluate(&self, F: &Mat3x2) -> MembraneResponse {
+        let rotation = polar_factor(F);
+        let deviation = F - rotation;
+        let trace = rotation.dot(&deviation);
+        let mut response = MembraneResponse {
+            density: self.mu * deviation.norm_squared() + 0.5 * self.lambda * trace * trace,
+            stress: deviation * (2.0 * self.mu) + rotation * (self.lambda * trace),
+        };
+        if let Some(limits) = self.limits {
+            let room = (1.0 - limits[0]).min(limits[1] - 1.0);
+            if deviation.norm_squared() > room * room {
+                let (U, stretches, V) = principal_axes(F);
+                for k in 0..2 {
+                    let beyond = excess(stretches[k], limits);
+                    response.density += 0.5 * self.limit_weight * beyond * beyond;
+                    response.stress += U[k] * V.column(k).transpose() * (self.limit_weight * beyond);
+                }
+            }
+        }
+        response
+    }
+
+    /// The Hessian over F: two modes that stretch, a shear and a turn in the plane, and two that tilt the
+    /// triangle out of it.
+    pub fn modes(&self, F: &Mat3x2) -> [MembraneMode; 6] {
+        let (U, s, V) = principal_axes(F);
+        let trace = s[0] + s[1] - 2.0;
+        let mut slope = s.map(|s| 2.0 * self.mu * (s - 1.0) + self.lambda * trace);
+        let mut curvature = Mat2::from_diagonal_element(2.0 * self.mu) + Mat2::repeat(self.lambda);
+        for k in 0..2 {
+            let beyond = self.limits.map_or(0.0, |limits| excess(s[k], limits));
+            slope[k] += self.limit_weight * beyond;
+            curvature[(k, k)] += if beyond == 0.0 { 0.0 } else { self.limit_weight };
+        }
+        let basis = |i: usize, j: usize| U[i] * V.column(j).transpose();
+        let normal = U[0].cross(&U[1]);
+        let stretching = curvature.symmetric_eigen();
+        let stretch = |k: usize| {
+            let e = stretching.eigenvectors.column(k);
+            let shape = basis(0, 0) * e[0] + basis(1, 1) * e[1];
+            MembraneMode { stiffness: stretching.eigenvalues[k], shape }
+        };
+        let size = s[0].max(s[1]).max(COLLAPSED);
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let difference = s[0] - s[1];
+        let shear = if difference.abs() > 1e-7 * size {
+            (slope[0] - slope[1]) / difference
+        } else {
+            0.5 * (curvature[(0, 0)] + curvature[(1, 1)]) - curvature[(0, 1)]
+        };
+        let turn = (slope[0] + slope[1]) / (s[0] + s[1]).max(COLLAPSED * size);
+        let tilt = |k: usize| MembraneMode {
+            stiffness: slope[k] / s[k].max(COLLAPSED * size),
+            shape: normal * V.column(k).transpose(),
+        };
+        [
+            stretch(0),
+            stretch(1),
+            MembraneMode { stiffness: shear, shape: (basis(0, 1) + basis(1, 0)) * half },
+            MembraneMode { stiffness: turn, shape: (basis(0, 1) - basis(1, 0)) * half },
+            tilt(0),
+            tilt(1),
+        ]
+    }
+
+    /// As of the tetrahedra's energies.
+    pub fn laplacian_weight(&self) -> f64 {
+        2.0 * self.mu + 0.5 * self.lambda
+    }
+}
+
+/// The R of orthonormal columns in `F = R S`, S symmetric and not negative: `S = (C + √det C·I)/tr S` with
+/// C = FᵀF.
+pub(crate) fn polar_factor(F: &Mat3x2) -> Mat3x2 {
+    let C = F.tr_mul(F);
+    let area = F.column(0).cross(&F.column(1)).norm();
+    if !(area > COLLAPSED * C.trace()) {
+        let (U, _, V) = principal_axes(F);
+        return U[0] * V.column(0).transpose() + U[1] * V.column(1).transpose();
+    }
+    let trace = (C.trace() + 2.0 * area).sqrt();
+    let S = (C + Mat2::from_diagonal_element(area)) / trace;
+    F * (Mat2::from_diagonal_element(trace) - S) / area
+}
+
+/// Orthonormal directions u in space, stretches σ ≥ 0 and directions v in the sheet with `F v = σ u`. What
+/// has no length takes any direction.
+fn principal_axes(F: &Mat3x2) -> ([Vec3; 2], [f64; 2], Mat2) {
+    let C = F.tr_mul(F);
+    if !C.iter().all(|v| v.is_finite()) {
+        return ([Vec3::x(), Vec3::y()], [1.0; 2], Mat2::identity());
+    }
+    let V = C.symmetric_eigen().eigenvectors;
+    let (a, b) = (F * V.column(0), F * V.column(1));
+    let stretches = [a.norm(), b.norm()];
+    let (long, short) = if stretches[0] >= stretches[1] { (a, b) } else { (b, a) };
+    let first = long.try_normalize(0.0).unwrap_or_else(Vec3::x);
+    let across = short - first * first.dot(&short);
+    let second =
+        across.try_normalize(COLLAPSED * long.norm()).unwrap_or_else(|| crate::math::tangents(&first)[0]);
+    (if stretches[0] >= stretches[1] { [first, second] } else { [second, first] }, stretches, V)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn sheets() -> [Membrane; 2] {
+        let material = DeformableMaterial::new(1.0, 0.4);
+        [Membrane::new(&material), Membrane::new(&material.strain_limits(0.9, 1.1))]
+    }
+
+    fn matrix(size: f64) -> impl Strategy<Value = Mat3x2> {
+        proptest::collection::vec(-size..size, 6).prop_map(|v| Mat3x2::from_column_slice(&v))
+    }
+
+    proptest! {
+        #[test]
+        fn stress_and_modes_are_derivatives(dev in matrix(0.5), dF in matrix(1.0)) {
+            let F = Mat3x2::identity() + dev;
+            let (_, s, _) = principal_axes(&F);
+            prop_assume!(s[0].min(s[1]) > 0.1);
+            prop_assume!(s.iter().all(|s| (s - 0.9).abs() > 1e-3 && (s - 1.1).abs() > 1e-3));
+            for sheet in sheets() {
+                let eps = 1e-5;
+                let [ahead, behind] = [eps, -eps].map(|t| sheet.evaluate(&(F + dF * t)));
+                let work = sheet.evaluate(&F).stress.dot(&dF);
+                // Central differences: 1e-10 · third derivative (to 1e2 at a stretch of 0.1).
+                prop_assert!(((ahead.density - behind.density) / (2.0 * eps) - work).abs() < 1e-6 * (1.0 + work.abs()));
+                let slope = (ahead.stress - behind.stress) / (2.0 * eps);
+                let product = sheet.modes(&F).iter().fold(Mat3x2::zeros(), |sum, m| {
+                    sum + m.shape * (m.stiffness * m.shape.dot(&dF))
+                });
+                prop_assert!((slope - product).norm() < 1e-5 * (1.0 + product.norm()), "{slope} {product}");
+            }
+        }
+
+        #[test]
+        fn anything_has_an_answer(v in proptest::collection::vec(
+            prop_oneof![4 => -3.0..3.0f64, 2 => Just(0.0), 1 => Just(1e-200), 1 => Just(-1e8)], 6)) {
+            for sheet in sheets() {
+                let r = sheet.evaluate(&Mat3x2::from_column_slice(&v));
+                prop_assert!(r.density.is_finite() && r.stress.iter().all(|s| s.is_finite()));
+                let modes = sheet.modes(&Mat3x2::from_column_slice(&v));
+                prop_assert!(modes.iter().all(|m| m.stiffness.is_finite()));
+            }
+        }
+    }
+
+    #[test]
+    fn pulled_along_one_axis_a_sheet_has_youngs_modulus() {
+        // σ = E ε and the width shrinks by ν ε, to the second order in ε = 1e-5.
+        let (e, nu, strain) = (1.0, 0.4, 1e-5);
+        let sheet = Membrane::new(&DeformableMaterial::new(e, nu));
+        let mut F = Mat3x2::identity();
+        F[(0, 0)] += strain;
+        F[(1, 1)] -= nu * strain;
+        let P = sheet.evaluate(&F).stress;
+        assert!((P[(0, 0)] - e * strain).abs() < 1e-9 && P[(1, 1)].abs() < 1e-9);
+    }
+}
