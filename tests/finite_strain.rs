@@ -1,0 +1,215 @@
+//! Large deformations against closed forms, and what is nearly incompressible.
+mod common;
+use common::*;
+use foible3d::prelude::*;
+use rapier3d::prelude::*;
+
+fn quiet_world() -> (PhysicsWorld, DeformableWorld) {
+    let mut physics = PhysicsWorld::new();
+    physics.gravity = Vector::ZERO;
+    (physics, DeformableWorld::new())
+}
+
+/// Nominal stress P₁ of a bar stretched to `stretch` with free sides, of the energy with principal stresses
+/// `dψ/dσ`: the lateral stretch is where P₂ = 0, found by bisection.
+fn uniaxial(stress: impl Fn(f64, f64) -> [f64; 2], stretch: f64) -> f64 {
+    let (mut low, mut high) = (0.3, 1.7);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if stress(stretch, middle)[1] > 0.0 { high = middle } else { low = middle }
+    }
+    stress(stretch, low)[0]
+}
+
+#[test]
+fn stretched_bars_have_the_stress_of_their_energy() {
+    let (e, nu) = (1e5, 0.45);
+    let (mu, lambda) = (e / (2.0 * (1.0 + nu)), e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)));
+    let neo = |a: f64, b: f64| {
+        let p = (lambda + mu) * (a * b * b - 1.0) - mu;
+        [mu * a + p * b * b, mu * b + p * a * b]
+    };
+    let fixed = |a: f64, b: f64| {
+        let p = lambda * (a * b * b - 1.0);
+        [2.0 * mu * (a - 1.0) + p * b * b, 2.0 * mu * (b - 1.0) + p * a * b]
+    };
+    let linear = |a: f64, b: f64| {
+        let trace = lambda * (a + 2.0 * b - 3.0);
+        [2.0 * mu * (a - 1.0) + trace, 2.0 * mu * (b - 1.0) + trace]
+    };
+    type Stress<'a> = &'a dyn Fn(f64, f64) -> [f64; 2];
+    let cases: [(Elasticity, Stress<'_>); 3] = [
+        (Elasticity::NeoHookean, &neo),
+        (Elasticity::FixedCorotated, &fixed),
+        (Elasticity::LinearCorotated, &linear),
+    ];
+    for (elasticity, stress) in cases {
+        // Pressed, a free bar would turn round.
+        for pull in [100.0, 300.0] {
+            let (mut physics, mut world) = quiet_world();
+            let bar = DeformableBodyBuilder::cuboid(Vector::new(0.25, 0.05, 0.05), [10, 2, 2])
+                .material(DeformableMaterial::new(e, nu).elasticity(elasticity).mass_damping(10.0))
+                .can_sleep(false);
+            let bar = world.insert(bar).unwrap();
+            // Uniform traction on both ends: each vertex its share of the faces of the lattice.
+            let body = &mut world.bodies[bar];
+            let mesh = TetMesh::cuboid([0.25, 0.05, 0.05], [10, 2, 2]).unwrap();
+            let triangles: Vec<[u32; 3]> = body.model().surface_triangles().collect();
+            for triangle in triangles {
+                let p = triangle.map(|v| mesh.vertices()[v as usize]);
+                for end in [-0.25, 0.25] {
+                    if p.iter().all(|p| p[0] == end) {
+                        // Right triangles of half a face of 0.05 m.
+                        let share = pull / 8.0 * end.signum();
+                        body.add_force(&triangle.map(|v| v as usize), Vector::X * share as f32).unwrap();
+                    }
+                }
+            }
+            for _ in 0..400 {
+                world.step(&mut physics);
+            }
+            let body = &world.bodies[bar];
+            let face = |sign: f64| mean_position(body, &at_rest_where(body, |p| sign * p[0] > 0.2499))[0];
+            let stretch = (face(1.0) - face(-1.0)) / 0.5;
+            let expected = uniaxial(stress, stretch);
+            let nominal = pull / 0.01;
+            println!(
+                "{elasticity:?}: stretch {stretch:.4}, stress {nominal:.0} Pa, closed form {expected:.0} Pa"
+            );
+            // Uniform: the mesh does not matter. What is left is the tolerance of the iteration.
+            assert!(
+                (expected / nominal - 1.0).abs() < 0.01,
+                "{elasticity:?} {stretch}: {expected} {nominal}"
+            );
+        }
+    }
+}
+
+/// A cylinder of radius 0.1 m and length 0.5 m along x: a lattice of squares pressed into discs.
+fn cylinder(across: usize, along: usize) -> TetMesh {
+    let mesh = TetMesh::cuboid([0.25, 0.1, 0.1], [along, across, across]).unwrap();
+    let round = mesh.vertices().iter().map(|&[x, y, z]| {
+        let (largest, length) = (y.abs().max(z.abs()), y.hypot(z));
+        let scale = if length > 0.0 { largest / length } else { 1.0 };
+        [x, y * scale, z * scale]
+    });
+    TetMesh::new(round.collect(), mesh.tetrahedra().to_vec()).unwrap()
+}
+
+#[test]
+fn twisted_neo_hookean_cylinder_has_its_energy_under_refinement() {
+    // Held at both ends and turned by θ, E = μ J θ²/(2L) exactly [Rivlin 1948], J = π R⁴/2, when nothing changes
+    // its volume. A twist does not, but for the square of its strain of 0.1 at the rim.
+    let (e, nu, angle) = (1e5, 0.3, 0.5f64);
+    let mu = e / (2.0 * (1.0 + nu));
+    let expected = mu * std::f64::consts::PI * 0.1f64.powi(4) / 2.0 * angle * angle / (2.0 * 0.5);
+    let mut errors = Vec::new();
+    for (across, along) in [(6, 9), (10, 15), (14, 21)] {
+        let (mut physics, mut world) = quiet_world();
+        let bar = DeformableBodyBuilder::mesh(&cylinder(across, along))
+            .material(DeformableMaterial::new(e, nu).elasticity(Elasticity::NeoHookean).mass_damping(10.0))
+            .fidelity(Fidelity::Engineering)
+            .pinned(|x| x.x.abs() > 0.2499)
+            .can_sleep(false);
+        let bar = world.insert(bar).unwrap();
+        let body = &mut world.bodies[bar];
+        for v in 0..body.vertex_count() {
+            let [x, y, z] = body.model().rest_position(v);
+            let (s, c) = (angle * (x / 0.5)).sin_cos();
+            let turned = [x, c * y - s * z, s * y + c * z];
+            body.set_position(v, turned).unwrap();
+            if x.abs() > 0.2499 {
+                body.pin(v).unwrap();
+            }
+        }
+        for _ in 0..120 {
+            world.step(&mut physics);
+        }
+        let body = &world.bodies[bar];
+        // Of a polygon of this many corners, J is less than the circle's: what is left is the elements' error.
+        let error = body.elastic_energy() / expected - 1.0;
+        println!(
+            "{across} × {along}: {} tets, energy off by {:.2} %",
+            body.model().tetrahedron_count(),
+            error * 100.0
+        );
+        errors.push(error);
+    }
+    // Second order in the mesh: the last two extrapolate to (49 e₃ − 25 e₂)/24.
+    let limit = (49.0 * errors[2] - 25.0 * errors[1]) / 24.0;
+    println!("extrapolated: {:.2} %", limit * 100.0);
+    assert!(errors[0].abs() > errors[1].abs() && errors[1].abs() > errors[2].abs());
+    assert!(limit.abs() < 0.01, "{limit}");
+}
+
+/// A cube of ν = 0.49 held at its bottom and pressed down at its top by a twentieth: volume over that at rest, and
+/// how far the middles of its sides have come out [m].
+fn pressed(elasticity: Elasticity, cells: usize, fidelity: Fidelity) -> (f64, f64) {
+    let (mut physics, mut world) = quiet_world();
+    let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [cells; 3])
+        .material(DeformableMaterial::new(1e5, 0.49).elasticity(elasticity).mass_damping(5.0))
+        .fidelity(fidelity)
+        .pinned(|x| x.y.abs() > 0.1999)
+        .can_sleep(false);
+    let cube = world.insert(cube).unwrap();
+    let top = at_rest_where(&world.bodies[cube], |p| p[1] > 0.1999);
+    for step in 1..=120 {
+        let down = 0.02 * (step as f32 / 60.0).min(1.0);
+        for &v in &top {
+            let [x, y, z] = world.bodies[cube].model().rest_position(v).map(|c| c as f32);
+            world.bodies[cube].move_pin(v, Vector::new(x, y - down, z)).unwrap();
+        }
+        world.step(&mut physics);
+    }
+    for _ in 0..60 {
+        world.step(&mut physics);
+    }
+    let body = &world.bodies[cube];
+    let side = at_rest_where(body, |p| p[0] > 0.1999 && p[1].abs() < 0.01 && p[2].abs() < 0.01);
+    (body.volume() / 0.064, mean_position(body, &side)[0] - 0.2)
+}
+
+#[test]
+fn pressed_cube_of_049_keeps_its_volume_and_bulges_as_newtons_method_says() {
+    for elasticity in Elasticity::ALL {
+        let (volume, bulge) = pressed(elasticity, 8, Fidelity::Engineering);
+        let (true_volume, true_bulge) = pressed(elasticity, 8, Fidelity::Reference);
+        let game = pressed(elasticity, 8, Fidelity::Game);
+        println!(
+            "{elasticity:?}: volume {volume:.5} (Newton {true_volume:.5}, Game {:.5}), bulge {:.3} mm (Newton {:.3}, Game {:.3})",
+            game.0,
+            bulge * 1e3,
+            true_bulge * 1e3,
+            game.1 * 1e3
+        );
+        assert!((bulge / true_bulge - 1.0).abs() < 0.02, "{elasticity:?}: {bulge} {true_bulge}");
+        assert!((volume - 1.0).abs() < 0.005, "{elasticity:?}: {volume}");
+    }
+}
+
+#[test]
+fn locking_of_linear_tetrahedra_is_what_the_readme_says() {
+    // Tip of a cantilever (1 × 0.2 × 0.2 m) under its own weight over that of the beam, at 495 and 4000 tets.
+    for nu in [0.3, 0.45, 0.49] {
+        let tips = [[11, 3, 3], [25, 5, 5], [32, 8, 8]].map(|cells| {
+            let mut physics = PhysicsWorld::new();
+            let mut world = DeformableWorld::new();
+            let e = 1e7;
+            let beam = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.1, 0.1), cells)
+                .material(DeformableMaterial::new(e, nu).mass_damping(20.0))
+                .pinned(|x| x.x < -0.4999)
+                .can_sleep(false);
+            let beam = world.insert(beam).unwrap();
+            for _ in 0..120 {
+                world.step(&mut physics);
+            }
+            let body = &world.bodies[beam];
+            let tip = -mean_position(body, &at_rest_where(body, |p| p[0] > 0.4999))[1];
+            let shear = 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu) * e / (2.0 * (1.0 + nu)) * 0.04;
+            let q = 1000.0 * G * 0.04;
+            tip / (q / (8.0 * e * 0.2f64.powi(4) / 12.0) + q / (2.0 * shear))
+        });
+        println!("ν {nu}: tip over beam's at 495, 3125 and 10240 tets {tips:.3?}");
+        assert!(tips[0] < tips[1] && tips[1] < tips[2] && tips[2] < 1.0);
+    }
+}
