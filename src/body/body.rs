@@ -256,7 +256,8 @@ impl DeformableBody {
         let mut unused = vec![Vec3::zeros(); self.state.x.len()];
         let undamped = elastic::StiffnessDamping::default();
         let frame = crate::math::Mat3::identity();
-        elastic::add_forces(&self.elements(), &undamped, &self.state.x, &frame, &mut unused).energy
+        let x = &self.state.x;
+        elastic::add_forces(&self.elements(), &undamped, x, &frame, f64::INFINITY, &mut unused).energy
     }
 
     /// Sets the velocity of all vertices [m/s].

@@ -123,7 +123,7 @@ impl DeformableBodyBuilder {
         Self {
             model,
             material: DeformableMaterial::new(1.0e6, 0.3),
-            settings: Fidelity::default().settings(build),
+            settings: build.defaults(),
             pose: Pose::IDENTITY,
             linvel: Vector::ZERO,
             angvel: Vector::ZERO,

@@ -70,17 +70,19 @@ pub(crate) struct Elastic {
 }
 
 /// Adds the elastic (and damping) forces \[N\] at positions `x` to `force`; `frame` is what the turn of
-/// the elements is measured against.
+/// the elements is measured against. Given up, with an infinite energy, as soon as that exceeds `limit` \[J\]:
+/// no element's is negative.
 pub(crate) fn add_forces(
     elements: &Elements<'_>,
     damping: &StiffnessDamping,
     x: &[Vec3],
     frame: &Mat3,
+    limit: f64,
     force: &mut [Vec3],
 ) -> Elastic {
     let Elements { model, material, .. } = elements;
     let mut elastic = with_energy!(material, energy => {
-        sum_elements(energy, model, material, damping, x, frame, force)
+        sum_elements(energy, model, material, damping, x, frame, limit, force)
     });
     if !(model.triangles.is_empty() && model.stencils.is_empty()) {
         elastic.energy += thin::add_forces(elements, &damping.thin, damping.ratio, x, force);
@@ -96,6 +98,7 @@ fn sum_elements[E: ElementEnergy](
     damping: &StiffnessDamping,
     x: &[Vec3],
     frame: &Mat3,
+    limit: f64,
     force: &mut [Vec3],
 ) -> Elastic {
     let lame = material.lame();
@@ -127,6 +130,9 @@ fn sum_elements[E: ElementEnergy](
             }
             least_trace = least_trace.zip(trace, f64::min);
             *F = response.stress;
+        }
+        if total.sum() > limit {
+            return Elastic { energy: f64::INFINITY, least_trace: 3.0 };
         }
         for (stress, block) in buffer.iter().zip(blocks) {
             scatter_forces(block, stress, force);
@@ -287,7 +293,7 @@ mod tests {
     fn forces(material: &DeformableMaterial, damping: &StiffnessDamping, x: &[Vec3]) -> (f64, Vec<Vec3>) {
         let mut f = vec![Vec3::zeros(); x.len()];
         let elements = Elements { model: &model(), material, activation: 1.0 };
-        let elastic = add_forces(&elements, damping, x, &Mat3::identity(), &mut f);
+        let elastic = add_forces(&elements, damping, x, &Mat3::identity(), f64::INFINITY, &mut f);
         (elastic.energy, f)
     }
 
@@ -365,7 +371,7 @@ mod tests {
             let material = DeformableMaterial::new(1.0, 0.3).elasticity(elasticity);
             let mut f = vec![Vec3::zeros(); x.len()];
             let elements = Elements { model: &model, material: &material, activation: 1.0 };
-            add_forces(&elements, &StiffnessDamping::default(), &x, &Mat3::identity(), &mut f);
+            add_forces(&elements, &StiffnessDamping::default(), &x, &Mat3::identity(), f64::INFINITY, &mut f);
             for (X, f) in model.rest.iter().zip(&f) {
                 if X.iter().all(|c| c.abs() < 0.29) {
                     assert!(f.norm() < 1e-10, "{elasticity:?}: {f}");

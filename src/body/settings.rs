@@ -102,15 +102,14 @@ impl Default for Acceleration {
 
 /// How much truth a body is solved for: settings for those who do not want to choose. What each costs and how
 /// far it is off is measured in the README.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Fidelity {
     /// Moves plausibly, three iterations of the [`SystemMatrix::Laplacian`]: stiff bodies bend and turn late.
     Preview,
-    /// The defaults.
-    #[default]
+    /// The defaults, at three times their tolerance.
     Game,
-    /// Iterated until a thousandth of the error of [`Fidelity::Game`] is left; sheets by Newton's method.
+    /// Iterated until less than a hundredth of the error of [`Fidelity::Game`] is left; sheets by Newton's method.
     Engineering,
     /// [`Solver::Newton`] until little but rounding is left.
     Reference,
@@ -127,6 +126,19 @@ pub(crate) enum Build {
     Rope,
 }
 
+impl Build {
+    /// What a body of that build is solved with if nothing else is asked for.
+    pub fn defaults(self) -> SolverSettings {
+        let defaults = SolverSettings::default();
+        match self {
+            Self::Solid => defaults,
+            // Their largest force is at the pins, hundreds of times that on other nodes.
+            Self::Sheet => SolverSettings { system: SystemMatrix::Laplacian, tolerance: 1.0e-3, ..defaults },
+            Self::Rope => SolverSettings { solver: Solver::Newton, ..defaults },
+        }
+    }
+}
+
 impl Fidelity {
     /// The settings for a body of that build.
     pub(crate) fn settings(self, build: Build) -> SolverSettings {
@@ -136,10 +148,8 @@ impl Fidelity {
         match (self, build) {
             (Self::Preview, Build::Rope) => SolverSettings { max_iterations: 1, tolerance: 0.0, ..newton },
             (Self::Preview, _) => SolverSettings { max_iterations: 3, tolerance: 0.0, ..laplacian },
-            (Self::Game, Build::Solid) => defaults,
-            // Their largest force is at the pins, hundreds of times that on other nodes.
-            (Self::Game, Build::Sheet) => SolverSettings { tolerance: 1.0e-3, ..laplacian },
-            (Self::Game, Build::Rope) => newton,
+            (Self::Game, Build::Solid) => SolverSettings { tolerance: 3.0 * defaults.tolerance, ..defaults },
+            (Self::Game, _) => build.defaults(),
             (Self::Engineering, Build::Solid) => {
                 SolverSettings { max_iterations: 50, tolerance: 1.0e-5, ..defaults }
             }

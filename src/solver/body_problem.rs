@@ -168,7 +168,9 @@ impl BodyProblem {
         self.frame = turned;
         self.evaluate_current();
         self.trial.x.clone_from(&self.target);
-        self.evaluate_trial();
+        let mut trial = std::mem::take(&mut self.trial);
+        self.evaluate(&mut trial, self.current.objective);
+        self.trial = trial;
         // Written so that a non-finite extrapolation loses.
         if !(self.current.objective <= self.trial.objective) {
             self.accept_trial();
@@ -366,24 +368,30 @@ impl BodyProblem {
 
     pub fn evaluate_current(&mut self) {
         let mut iterate = std::mem::take(&mut self.current);
-        self.evaluate(&mut iterate);
+        self.evaluate(&mut iterate, f64::INFINITY);
         self.current = iterate;
     }
 
     pub fn evaluate_trial(&mut self) {
         let mut iterate = std::mem::take(&mut self.trial);
-        self.evaluate(&mut iterate);
+        self.evaluate(&mut iterate, f64::INFINITY);
         self.trial = iterate;
     }
 
-    fn evaluate(&mut self, at: &mut Iterate) {
+    /// Given up, with an infinite objective, where that would exceed `limit` \[J\].
+    fn evaluate(&mut self, at: &mut Iterate, limit: f64) {
         at.r.clear();
         at.r.resize(at.x.len(), Vec3::zeros());
         let (model, material, activation) = (&*self.model, &self.material, self.activation);
         let elements = Elements { model, material, activation };
         let time = &mut self.metric.effort.element_time;
-        let elastic =
-            timed(time, || elastic::add_forces(&elements, &self.damping, &at.x, &self.frame, &mut at.r));
+        let elastic = timed(time, || {
+            elastic::add_forces(&elements, &self.damping, &at.x, &self.frame, limit, &mut at.r)
+        });
+        if elastic.energy == f64::INFINITY {
+            at.objective = f64::INFINITY;
+            return;
+        }
         at.least_trace = elastic.least_trace;
         at.internal = at.r.iter().map(|f| f.amax()).fold(0.0, f64::max);
         let (inertia, drag) = (1.0 / (self.h * self.h), self.material.mass_damping / self.h);

@@ -1,0 +1,184 @@
+//! What accuracy costs: every rung of the ladder of solvers over a set of scenes, against Newton's method and
+//! rapier's own soft bodies. `cargo bench --bench trade`
+//!
+//! Prints tables, writes `target/trade.csv` and `target/trade.svg`. One thread: a scene has one island. Error:
+//! of paths the root mean square distance from the reference's at the same step and mesh, of shapes at rest that at
+//! the end, both over the largest displacement of the reference. The reference is Newton's method to
+//! 1e-10 up to 1000 tetrahedra, and beyond the default solver to 1e-9, which comes to the same
+//! (`tests/solvers.rs`).
+
+mod plot;
+mod rapier;
+mod rungs;
+mod scenes;
+#[path = "../shared/mod.rs"]
+mod shared;
+
+use rungs::{Rung, presets, reference, rungs};
+use scenes::{Measure, Record, Scene, scenes};
+use std::fmt::Write as _;
+
+/// One run of one rung in one scene.
+struct Point {
+    scene: String,
+    family: String,
+    rung: String,
+    ms: f64,
+    error: f64,
+}
+
+fn main() {
+    let mut csv = String::from(
+        "scene,engine,setting,tets,dt,ms_per_step,worst_ms,error,volume_error,force_error,deepest\n",
+    );
+    let mut points = Vec::new();
+    for scene in scenes() {
+        let truth = scene.run(&reference(scene.tets()));
+        println!("\n{} ({} elements, h = 1/{:.0})", scene.name, scene.tets(), 1.0 / scene.dt);
+        for rung in rungs(&scene) {
+            let record = scene.run(&rung);
+            report(&scene, &rung.family, &rung.name, &record, &truth, &mut csv, &mut points);
+        }
+        for setting in rapier::SETTINGS {
+            if let Some(record) = rapier::run(&scene, setting) {
+                report(&scene, "rapier", setting, &record, &truth, &mut csv, &mut points);
+            }
+        }
+    }
+    preset_table(&mut csv, &mut points);
+    step_table();
+    let target = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("target");
+    std::fs::write(target.join("trade.csv"), csv).expect("target can be written to");
+    plot::draw(&target.join("trade.svg"), &points).expect("target can be written to");
+    println!("\nwritten to target/trade.csv and target/trade.svg");
+}
+
+fn report(
+    scene: &Scene,
+    family: &str,
+    rung: &str,
+    record: &Record,
+    truth: &Record,
+    csv: &mut String,
+    points: &mut Vec<Point>,
+) {
+    let error = record.error(truth, scene.measure);
+    println!(
+        "  {:<34} {:>8.3} ms {:>8.2} worst  error {:>8.1e}  volume {:>8.1e}  force {:>8.1e}  deepest {:>8.1e} m",
+        format!("{family}, {rung}"),
+        record.median(),
+        record.worst(),
+        error,
+        record.volume_error,
+        record.force_error,
+        record.deepest
+    );
+    let engine = if family == "rapier" { "rapier" } else { "foible3d" };
+    let _ = writeln!(
+        csv,
+        "{},{engine},{family} {rung},{},{},{:.5},{:.5},{error:.4e},{:.4e},{:.4e},{:.4e}",
+        scene.name,
+        scene.tets(),
+        scene.dt,
+        record.median(),
+        record.worst(),
+        record.volume_error,
+        record.force_error,
+        record.deepest
+    );
+    points.push(Point {
+        scene: scene.name.clone(),
+        family: family.into(),
+        rung: rung.into(),
+        ms: record.median(),
+        error,
+    });
+}
+
+/// The presets at 1000, 4000 and 16000 tetrahedra: a cantilever let go, and the same at rest.
+fn preset_table(csv: &mut String, points: &mut Vec<Point>) {
+    println!("\npresets: swinging and sagging cantilever, ms per step and error");
+    for cells in [[20, 3, 3], [32, 5, 5], [50, 8, 8]] {
+        let swing = Scene::cantilever("presets swing", cells, 1e6, 0.3, Measure::Path);
+        let sag = Scene::cantilever("presets sag", cells, 1e6, 0.3, Measure::End);
+        let truths = [&swing, &sag].map(|scene| scene.run(&reference(scene.tets())));
+        for rung in presets() {
+            // Newton's method at that size takes minutes and is what the others are measured by.
+            if rung.name == "Reference" && swing.tets() > 5000 {
+                continue;
+            }
+            let records = [&swing, &sag].map(|scene| scene.run(&rung));
+            let errors = [0, 1].map(|k| records[k].error(&truths[k], [swing.measure, sag.measure][k]));
+            println!(
+                "  {:>6} tets  {:<12} {:>8.3} ms  swing {:>8.1e}  sag {:>8.1e}",
+                swing.tets(),
+                rung.name,
+                records[0].median(),
+                errors[0],
+                errors[1]
+            );
+            for (k, scene) in [&swing, &sag].into_iter().enumerate() {
+                report_quietly(scene, &rung, &records[k], errors[k], csv, points);
+            }
+        }
+        for setting in rapier::SETTINGS {
+            for (scene, truth) in [(&swing, &truths[0]), (&sag, &truths[1])] {
+                if let Some(record) = rapier::run(scene, setting) {
+                    report(scene, "rapier", setting, &record, truth, csv, points);
+                }
+            }
+        }
+    }
+}
+
+fn report_quietly(
+    scene: &Scene,
+    rung: &Rung,
+    record: &Record,
+    error: f64,
+    csv: &mut String,
+    points: &mut Vec<Point>,
+) {
+    let _ = writeln!(
+        csv,
+        "{},foible3d,{},{},{},{:.5},{:.5},{error:.4e},{:.4e},{:.4e},{:.4e}",
+        scene.name,
+        rung.name,
+        scene.tets(),
+        scene.dt,
+        record.median(),
+        record.worst(),
+        record.volume_error,
+        record.force_error,
+        record.deepest
+    );
+    points.push(Point {
+        scene: format!("{} {}", scene.name, scene.tets()),
+        family: rung.family.clone(),
+        rung: rung.name.clone(),
+        ms: record.median(),
+        error,
+    });
+}
+
+/// What the step itself costs: the converged path at each step against that at 1/1920 s.
+fn step_table() {
+    println!("\nswinging cantilever (900 tets), converged steps against h = 1/1920 s");
+    let scene = |h: f32| {
+        let mut scene = Scene::cantilever("steps", [20, 3, 3], 1e6, 0.3, Measure::Path);
+        scene.steps = (scene.steps as f32 * scene.dt / h).round() as usize;
+        scene.dt = h;
+        scene
+    };
+    let rung = &presets()[2];
+    let every = |record: &Record, n: usize| Record {
+        path: record.path.iter().skip(n - 1).step_by(n).copied().collect(),
+        ..record.clone()
+    };
+    let truth = scene(1.0 / 1920.0).run(rung);
+    for per_second in [30usize, 60, 120, 240, 480] {
+        let record = scene(1.0 / per_second as f32).run(rung);
+        let error = record.error(&every(&truth, 1920 / per_second), Measure::Path);
+        println!("  h = 1/{per_second:<4} error {error:.3}  {:.3} ms per step", record.median());
+    }
+}
