@@ -47,7 +47,7 @@ mod pipeline;
 pub use body::{
     Acceleration, AttachTo, BodyError, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
     DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableModel, DeformableState,
-    FactorPrecision, Fidelity, Frames, Pin, Solver, SolverSettings, SystemMatrix,
+    FactorPrecision, Fidelity, Frames, Integrator, Pin, Solver, SolverSettings, SystemMatrix,
 };
 pub use contact::DeformableSurfacePoint;
 pub use coupling::PhysicsParts;
@@ -67,8 +67,8 @@ pub mod prelude {
         DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
         DeformableContact, DeformableCounters, DeformableMaterial, DeformableModel, DeformablePairContact,
         DeformableParameters, DeformablePipeline, DeformableSurfacePoint, DeformableWorld, Elasticity,
-        FactorPrecision, Fidelity, Frames, JointForce, JointRole, PhysicsParts, RigidContact, SolvedJoint,
-        Solver, SolverSettings, Structure, SystemMatrix, TetMesh,
+        FactorPrecision, Fidelity, Frames, Integrator, JointForce, JointRole, PhysicsParts, RigidContact,
+        SolvedJoint, Solver, SolverSettings, Structure, SystemMatrix, TetMesh,
     };
 }
 

@@ -1,5 +1,5 @@
 //! What accuracy costs: every rung of the ladder of solvers over a set of scenes, against Newton's method and
-//! rapier's own soft bodies. `cargo bench --bench trade`
+//! rapier's own soft bodies. `cargo bench --bench trade`; `-- steps` for the table of steps and integrators alone.
 //!
 //! Prints tables, writes `target/trade.csv` and `target/trade.svg`. One thread: a scene has one island. Error:
 //! of paths the root mean square distance from the reference's at the same step and mesh, of shapes at rest that at
@@ -14,7 +14,8 @@ mod scenes;
 #[path = "../shared/mod.rs"]
 mod shared;
 
-use rungs::{Rung, presets, reference, rungs};
+use foible3d::prelude::*;
+use rungs::{Choice, Rung, presets, reference, rungs};
 use scenes::{Measure, Record, Scene, scenes};
 use std::fmt::Write as _;
 
@@ -28,11 +29,12 @@ struct Point {
 }
 
 fn main() {
+    let only_steps = std::env::args().any(|a| a == "steps");
     let mut csv = String::from(
         "scene,engine,setting,tets,dt,ms_per_step,worst_ms,error,volume_error,force_error,deepest\n",
     );
     let mut points = Vec::new();
-    for scene in scenes() {
+    for scene in if only_steps { Vec::new() } else { scenes() } {
         let truth = scene.run(&reference(scene.tets()));
         println!("\n{} ({} elements, h = 1/{:.0})", scene.name, scene.tets(), 1.0 / scene.dt);
         for rung in rungs(&scene) {
@@ -45,8 +47,13 @@ fn main() {
             }
         }
     }
-    preset_table(&mut csv, &mut points);
-    step_table();
+    if !only_steps {
+        preset_table(&mut csv, &mut points);
+    }
+    step_table(&mut csv);
+    if only_steps {
+        return;
+    }
     let target = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("target");
     std::fs::write(target.join("trade.csv"), csv).expect("target can be written to");
     plot::draw(&target.join("trade.svg"), &points).expect("target can be written to");
@@ -161,24 +168,42 @@ fn report_quietly(
     });
 }
 
-/// What the step itself costs: the converged path at each step against that at 1/1920 s.
-fn step_table() {
-    println!("\nswinging cantilever (900 tets), converged steps against h = 1/1920 s");
-    let scene = |h: f32| {
+/// What the step itself costs: the converged path at each step against that at 1/3840 s of the second order.
+fn step_table(csv: &mut String) {
+    println!("\nswinging cantilever (900 tets), converged steps against h = 1/3840 s");
+    let scene = |per_second: usize| {
         let mut scene = Scene::cantilever("steps", [20, 3, 3], 1e6, 0.3, Measure::Path);
-        scene.steps = (scene.steps as f32 * scene.dt / h).round() as usize;
-        scene.dt = h;
+        scene.steps = 3 * per_second / 2;
+        scene.dt = 1.0 / per_second as f32;
         scene
     };
-    let rung = &presets()[2];
-    let every = |record: &Record, n: usize| Record {
+    let rung = |integrator| Rung {
+        family: "steps".into(),
+        name: format!("{integrator:?}"),
+        choice: Choice::Own(SolverSettings {
+            integrator,
+            max_iterations: 50,
+            tolerance: 1e-6,
+            ..SolverSettings::default()
+        }),
+    };
+    // At the times of the coarsest step, 1/30 s.
+    let coarse = |record: &Record, n: usize| Record {
         path: record.path.iter().skip(n - 1).step_by(n).copied().collect(),
         ..record.clone()
     };
-    let truth = scene(1.0 / 1920.0).run(rung);
-    for per_second in [30usize, 60, 120, 240, 480] {
-        let record = scene(1.0 / per_second as f32).run(rung);
-        let error = record.error(&every(&truth, 1920 / per_second), Measure::Path);
-        println!("  h = 1/{per_second:<4} error {error:.3}  {:.3} ms per step", record.median());
+    let truth = coarse(&scene(3840).run(&rung(Integrator::Bdf2)), 3840 / 30);
+    for per_second in [30, 60, 120, 240, 480] {
+        for integrator in [Integrator::ImplicitEuler, Integrator::Bdf2] {
+            let (scene, rung) = (scene(per_second), rung(integrator));
+            let record = scene.run(&rung);
+            let error = coarse(&record, per_second / 30).error(&truth, Measure::Path);
+            println!(
+                "  h = 1/{per_second:<4} {:<14} error {error:.4}  {:.3} ms per step",
+                rung.name,
+                record.median()
+            );
+            report_quietly(&scene, &rung, &record, error, csv, &mut Vec::new());
+        }
     }
 }

@@ -87,6 +87,23 @@ fn shape(shape: &Shape) -> SharedShape {
     }
 }
 
+/// A polyline cut into segments of equal length.
+fn polyline(points: &[[f32; 3]], segments: usize) -> Vec<Vector> {
+    let points: Vec<Vector> = points.iter().map(|&p| p.into()).collect();
+    let lengths: Vec<f32> = points.windows(2).map(|p| (p[1] - p[0]).length()).collect();
+    let total: f32 = lengths.iter().sum();
+    let at = |mut along: f32| {
+        for (ends, length) in points.windows(2).zip(&lengths) {
+            if along <= *length {
+                return ends[0] + (ends[1] - ends[0]) * (along / length);
+            }
+            along -= length;
+        }
+        points.last().copied().unwrap_or_default()
+    };
+    (0..=segments).map(|k| at(total * k as f32 / segments.max(1) as f32)).collect()
+}
+
 fn deformable(body: &file::Deformable, folder: &Path) -> DeformableBodyBuilder {
     let builder = match body.body.as_ref() {
         Body::Lattice { half_extents, cells } => {
@@ -96,33 +113,64 @@ fn deformable(body: &file::Deformable, folder: &Path) -> DeformableBodyBuilder {
             DeformableBodyBuilder::filled(&*shape(filled), *cell_size)
         }
         Body::Mesh { path } => DeformableBodyBuilder::gmsh(folder.join(path)),
+        Body::Cloth { half_extents, cells, thickness } => {
+            DeformableBodyBuilder::cloth(*half_extents, *cells, *thickness)
+        }
+        Body::Rope { points, segments, radius } => {
+            DeformableBodyBuilder::rope(&polyline(points, *segments), *radius)
+        }
+        Body::Network { half_extents, cells } => {
+            match TetMesh::cuboid(half_extents.map(f64::from), *cells) {
+                Ok(mesh) => DeformableBodyBuilder::spring_network(&mesh),
+                // Which says what is wrong with it.
+                Err(_) => DeformableBodyBuilder::cuboid((*half_extents).into(), *cells),
+            }
+        }
     };
-    let defaults = SolverSettings::default();
-    let settings = SolverSettings {
-        system: match body.solver.system {
-            Some(file::System::Laplacian) => SystemMatrix::Laplacian,
-            Some(file::System::RestStiffness) | None => SystemMatrix::RestStiffness,
-        },
-        frames: match body.solver.frames {
-            Some(file::Frames::Floating) => Frames::Floating,
-            Some(file::Frames::PerNode) => Frames::PerNode,
-            Some(file::Frames::Automatic) | None => Frames::Automatic,
-        },
-        max_iterations: body.solver.max_iterations.unwrap_or(defaults.max_iterations),
-        tolerance: body.solver.tolerance.unwrap_or(defaults.tolerance),
-        acceleration: match body.solver.lbfgs {
+    let builder = match body.solver.fidelity {
+        Some(file::Fidelity::Preview) => builder.fidelity(Fidelity::Preview),
+        Some(file::Fidelity::Game) => builder.fidelity(Fidelity::Game),
+        Some(file::Fidelity::Engineering) => builder.fidelity(Fidelity::Engineering),
+        Some(file::Fidelity::Reference) => builder.fidelity(Fidelity::Reference),
+        None => builder,
+    };
+    let asked = &body.solver;
+    let builder = builder.tune(|settings| {
+        if let Some(kind) = asked.kind {
+            settings.solver = match kind {
+                file::SolverKind::Projective => Solver::Projective,
+                file::SolverKind::ConjugateGradients => Solver::ConjugateGradients,
+                file::SolverKind::GaussSeidel => Solver::GaussSeidel,
+                file::SolverKind::Jacobi => Solver::Jacobi,
+                file::SolverKind::Newton => Solver::Newton,
+            };
+        }
+        if let Some(system) = asked.system {
+            settings.system = match system {
+                file::System::Laplacian => SystemMatrix::Laplacian,
+                file::System::RestStiffness => SystemMatrix::RestStiffness,
+            };
+        }
+        if let Some(frames) = asked.frames {
+            settings.frames = match frames {
+                file::Frames::Floating => Frames::Floating,
+                file::Frames::PerNode => Frames::PerNode,
+                file::Frames::Automatic => Frames::Automatic,
+            };
+        }
+        settings.max_iterations = asked.max_iterations.unwrap_or(settings.max_iterations);
+        settings.tolerance = asked.tolerance.unwrap_or(settings.tolerance);
+        settings.acceleration = match asked.lbfgs {
             Some(0) => Acceleration::None,
             Some(window) => Acceleration::Lbfgs { window },
-            None => defaults.acceleration,
-        },
-        ..defaults
-    };
+            None => settings.acceleration,
+        };
+    });
     let builder = builder
         .pose(pose(body.translation, body.rotation))
         .linvel(body.linvel.into())
         .angvel(body.angvel.into())
         .material(body.material.as_ref().to_material())
-        .settings(settings)
         // What a scene expects of rest is to be found awake.
         .can_sleep(false);
     let builder = builder.self_contact(body.self_contact);

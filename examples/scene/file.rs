@@ -162,6 +162,23 @@ pub enum Body {
     Mesh {
         path: String,
     },
+    /// A rectangle of triangles in the plane of x and z.
+    Cloth {
+        half_extents: [f32; 2],
+        cells: [usize; 2],
+        thickness: f32,
+    },
+    /// A polyline, cut into `segments` of equal length.
+    Rope {
+        points: Vec<Vec3>,
+        segments: usize,
+        radius: f32,
+    },
+    /// The edges of a lattice as springs.
+    Network {
+        half_extents: Vec3,
+        cells: [usize; 3],
+    },
 }
 
 #[derive(Debug, Deserialize)]
@@ -181,6 +198,8 @@ pub struct Material {
     pub stiffness_damping: f64,
     #[serde(default)]
     pub elasticity: Elasticity,
+    /// Least and largest stretch.
+    pub strain_limits: Option<[f64; 2]>,
 }
 
 fn density() -> f64 {
@@ -197,6 +216,8 @@ pub enum Elasticity {
     #[default]
     LinearCorotated,
     Projective,
+    FixedCorotated,
+    NeoHookean,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -225,12 +246,34 @@ impl Regions {
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Solver {
+    /// A preset that the other keys change.
+    pub fidelity: Option<Fidelity>,
+    pub kind: Option<SolverKind>,
     pub system: Option<System>,
     pub frames: Option<Frames>,
     pub max_iterations: Option<usize>,
     pub tolerance: Option<f64>,
     /// Pairs of L-BFGS; 0 for none.
     pub lbfgs: Option<usize>,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fidelity {
+    Preview,
+    Game,
+    Engineering,
+    Reference,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SolverKind {
+    Projective,
+    ConjugateGradients,
+    GaussSeidel,
+    Jacobi,
+    Newton,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -466,13 +509,31 @@ fn body_problem(body: &Body) -> Option<String> {
             let size = wrong.then(|| format!("`cell_size` is {cell_size}, but must be positive"));
             size.or_else(|| shape_problem(shape))
         }
+        Body::Network { half_extents, cells } => {
+            let lattice = Body::Lattice { half_extents: *half_extents, cells: *cells };
+            body_problem(&lattice)
+        }
+        Body::Cloth { half_extents: [x, z], cells, thickness } => {
+            if cells.contains(&0) {
+                return Some(format!("`cells` is {cells:?}, but every axis needs at least one"));
+            }
+            let thin = !(*thickness > 0.0 && thickness.is_finite());
+            let thin = thin.then(|| format!("`thickness` is {thickness}, but must be positive"));
+            thin.or_else(|| shape_problem(&Shape::Cuboid { half_extents: [*x, *thickness, *z] }))
+        }
+        Body::Rope { points, segments, radius } => {
+            if points.len() < 2 || *segments == 0 {
+                return Some("a rope needs at least two `points` and one of `segments`".into());
+            }
+            shape_problem(&Shape::Ball { radius: *radius })
+        }
         Body::Mesh { .. } => None,
     }
 }
 
 impl Material {
     pub fn to_material(&self) -> foible3d::DeformableMaterial {
-        foible3d::DeformableMaterial::new(self.youngs_modulus, self.poisson_ratio)
+        let material = foible3d::DeformableMaterial::new(self.youngs_modulus, self.poisson_ratio)
             .density(self.density)
             .friction(self.friction)
             .restitution(self.restitution)
@@ -481,7 +542,13 @@ impl Material {
             .elasticity(match self.elasticity {
                 Elasticity::LinearCorotated => foible3d::Elasticity::LinearCorotated,
                 Elasticity::Projective => foible3d::Elasticity::Projective,
-            })
+                Elasticity::FixedCorotated => foible3d::Elasticity::FixedCorotated,
+                Elasticity::NeoHookean => foible3d::Elasticity::NeoHookean,
+            });
+        match self.strain_limits {
+            Some([least, largest]) => material.strain_limits(least, largest),
+            None => material,
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use super::elastic;
 use super::model::DeformableModel;
 use super::settings::{Acceleration, SolverSettings};
 use super::sleep::Sleep;
-use super::state::{ContactMemory, DeformableState};
+use super::state::{ContactMemory, DeformableState, History};
 use crate::material::{DeformableMaterial, MaterialError};
 use crate::math::{Pose64, Vec3, from_real, to_real};
 use parry3d::bounding_volume::Aabb;
@@ -113,6 +113,7 @@ impl DeformableBody {
             v: vec![Vec3::zeros(); model.rest.len()],
             contacts: Vec::new(),
             closure: Vec::new(),
+            history: History::default(),
             sleep: Sleep::default(),
         };
         Self {
@@ -266,6 +267,7 @@ impl DeformableBody {
     /// [`BodyError::NotFinite`].
     pub fn set_linvel(&mut self, linvel: Vector) -> Result<(), BodyError> {
         self.wake_up();
+        self.state.history.clear();
         let linvel = finite("linear velocity", linvel)?;
         self.state.v.fill(linvel);
         Ok(())
@@ -277,6 +279,7 @@ impl DeformableBody {
     /// [`BodyError::NotFinite`].
     pub fn set_vels(&mut self, linvel: Vector, angvel: Vector) -> Result<(), BodyError> {
         self.wake_up();
+        self.state.history.clear();
         let linvel = finite("linear velocity", linvel)?;
         let angvel = finite("angular velocity", angvel)?;
         let centre = self.weighted_mean(&self.state.x);
@@ -292,6 +295,7 @@ impl DeformableBody {
     /// [`BodyError::NoSuchVertex`], [`BodyError::NotFinite`].
     pub fn set_velocity(&mut self, vertex: usize, velocity: Vector) -> Result<(), BodyError> {
         self.wake_up();
+        self.state.history.clear();
         let node = self.node(vertex)?;
         self.state.v[node] = finite("velocity", velocity)?;
         Ok(())
@@ -303,6 +307,7 @@ impl DeformableBody {
     /// [`BodyError::NoSuchVertex`], [`BodyError::NotFinite`].
     pub fn set_position(&mut self, vertex: usize, position: [f64; 3]) -> Result<(), BodyError> {
         self.wake_up();
+        self.state.history.clear();
         let node = self.node(vertex)?;
         finite("position", to_real(&position.into()))?;
         self.state.x[node] = position.into();
@@ -316,6 +321,7 @@ impl DeformableBody {
     /// [`BodyError::NotFinite`].
     pub fn teleport(&mut self, by: Pose) -> Result<(), BodyError> {
         self.wake_up();
+        self.state.history.clear();
         finite("translation", by.translation)?;
         finite("rotation", by.rotation.to_scaled_axis())?;
         let pose = Pose64::from_real(&by);
@@ -410,6 +416,7 @@ impl DeformableBody {
     /// As [`DeformableBody::add_force`].
     pub fn apply_impulse(&mut self, vertices: &[usize], impulse: Vector) -> Result<(), BodyError> {
         self.wake_up();
+        self.state.history.clear();
         let share = self.share("impulse", vertices, impulse)?;
         for &vertex in vertices {
             let node = self.node(vertex)?;

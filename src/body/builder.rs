@@ -151,6 +151,12 @@ impl DeformableBodyBuilder {
         self
     }
 
+    /// Changes some knobs of the solver and leaves the others as they suit what the body is made of.
+    pub fn tune(mut self, change: impl FnOnce(&mut SolverSettings)) -> Self {
+        change(&mut self.settings);
+        self
+    }
+
     /// Sets the knobs of the solver to those of a preset, for what the body is made of.
     pub fn fidelity(mut self, fidelity: Fidelity) -> Self {
         self.settings = fidelity.settings(self.model.as_ref().map_or(Build::Solid, |m| m.build()));

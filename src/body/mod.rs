@@ -24,7 +24,9 @@ pub use body::{BodyError, DeformableBody, Pin};
 pub use builder::DeformableBodyBuilder;
 pub use model::DeformableModel;
 pub use set::{DeformableBodyHandle, DeformableBodySet};
-pub use settings::{Acceleration, FactorPrecision, Fidelity, Frames, Solver, SolverSettings, SystemMatrix};
+pub use settings::{
+    Acceleration, FactorPrecision, Fidelity, Frames, Integrator, Solver, SolverSettings, SystemMatrix,
+};
 pub(crate) use sleep::{Surroundings, TIME_UNTIL_SLEEP};
 pub use state::DeformableState;
 pub(crate) use state::{ContactGeometry, ContactKey, ContactMemory, FIRST_LINK_SLOT, SOFT_SLOT, is_number};

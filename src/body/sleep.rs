@@ -68,6 +68,7 @@ impl DeformableBody {
     /// Falls asleep where it is.
     pub(crate) fn fall_asleep(&mut self, surroundings: Surroundings) {
         self.state.v.fill(Vec3::zeros());
+        self.state.history.clear();
         self.state.sleep.surroundings = Some(surroundings);
     }
 }

@@ -16,7 +16,25 @@ pub struct DeformableState {
     /// What held the rigid bodies of the island in the last step, ascending by key; with the first body
     /// of the island.
     pub(crate) closure: Vec<ContactMemory>,
+    /// Where the last step began, of bodies that go forward by two.
+    pub(crate) history: History,
     pub(crate) sleep: Sleep,
+}
+
+/// The state before the last step; empty where there is none to go on from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct History {
+    /// Length of the step \[s\].
+    pub h: f64,
+    pub x: Vec<Vec3>,
+    pub v: Vec<Vec3>,
+}
+
+impl History {
+    pub fn clear(&mut self) {
+        self.x.clear();
+        self.v.clear();
+    }
 }
 
 /// Names a contact over several steps.

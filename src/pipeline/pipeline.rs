@@ -1,8 +1,8 @@
 //! The step.
 //!
 //! ```text
-//! read_obstacles → wake → predict → detect → meet → tie → close → prepare_factors → form_islands → solve →
-//! advance → fall_asleep → write reactions → (rapier steps) → after_step
+//! read_obstacles → wake → predict → detect → meet → tie → close → settle_orders → prepare_factors →
+//! form_islands → solve → advance → fall_asleep → write reactions → (rapier steps) → after_step
 //! ```
 
 use super::contacts::{DeformableContact, DeformablePairContact, JointForce, RigidContact};
@@ -13,12 +13,15 @@ use super::readout::{add_attachment_forces, list_closure, list_contacts, list_pa
 use super::sleeping::Sleeping;
 use super::threads::for_each;
 use super::work::{BodyWork, IslandWork};
-use crate::body::{DeformableAttachment, DeformableBody, DeformableBodyHandle, DeformableBodySet, is_number};
+use crate::body::{
+    DeformableAttachment, DeformableBody, DeformableBodyHandle, DeformableBodySet, DeformableState,
+    Integrator, is_number,
+};
 use crate::contact::{Candidates, Row, Side};
 use crate::coupling::{Around, Closure, PhysicsParts, RapierScene, RapierSets, Reactions, tie_rows};
 use crate::error::DeformableBodyError;
 use crate::math::from_real;
-use crate::solver::{FactorCache, FactorKey, ROUNDING, Reaction};
+use crate::solver::{FactorCache, FactorKey, ROUNDING, Reaction, SECOND_ORDER};
 use rapier3d::math::Vector;
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
@@ -94,7 +97,8 @@ impl DeformablePipeline {
         self.tie(deformables, sets, gravity, h);
         self.close(sets, gravity, h, parameters.closure_bodies);
         self.counters.detection_time = clock.lap();
-        self.prepare_factors(deformables, h, parameters.column_budget);
+        self.settle_orders(deformables, gravity);
+        self.prepare_factors(deformables, parameters.column_budget);
         self.form_islands(deformables);
         self.counters.factor_time = clock.lap();
         self.solve(parameters, h);
@@ -123,6 +127,10 @@ impl DeformablePipeline {
         for (_, body) in deformables.iter().filter(|(_, b)| b.is_enabled()) {
             let all = 0..body.model.surface.nodes.len() as u32;
             self.factors.prepare(&FactorKey::new(body, h), body, h, all);
+            if body.settings().integrator == Integrator::Bdf2 {
+                let h = SECOND_ORDER * h;
+                self.factors.prepare(&FactorKey::new(body, h), body, h, std::iter::empty());
+            }
         }
         Ok(())
     }
@@ -171,7 +179,7 @@ impl DeformablePipeline {
             }
             if !body.state.is_finite() {
                 if let Some(work) = self.idle.get(&handle) {
-                    work.roll_back(body, h);
+                    work.roll_back(body);
                 }
                 quarantine(body, &mut self.counters);
                 continue;
@@ -234,7 +242,17 @@ impl DeformablePipeline {
         self.counters.contacts = self.ties.len() + self.works.iter().map(|w| w.rows.len()).sum::<usize>();
     }
 
-    fn prepare_factors(&mut self, deformables: &mut DeformableBodySet, h: f64, column_budget: usize) {
+    /// Bodies that are touched go on by implicit Euler.
+    fn settle_orders(&mut self, deformables: &DeformableBodySet, gravity: Vector) {
+        let gravity = from_real(gravity);
+        for work in self.works.iter_mut().filter(|work| work.is_touched()) {
+            if let Some(problem) = &mut work.problem {
+                problem.begin_first_order(&deformables[work.handle], &gravity);
+            }
+        }
+    }
+
+    fn prepare_factors(&mut self, deformables: &mut DeformableBodySet, column_budget: usize) {
         self.factors.begin_step(column_budget);
         let (factors, counters) = (&mut self.factors, &mut self.counters);
         let count = self.works.len();
@@ -243,7 +261,7 @@ impl DeformablePipeline {
                 return false;
             };
             // Numbers beyond what double precision can factor: stiffness over inertia of 1e15 and more.
-            let Some(done) = factors.prepare(&problem.key, body, h, work.touched_nodes()) else {
+            let Some(done) = factors.prepare(&problem.key, body, problem.h(), work.touched_nodes()) else {
                 quarantine(body, counters);
                 return false;
             };
@@ -389,6 +407,13 @@ fn store(
     counters: &mut DeformableCounters,
 ) {
     let problem = &work.island.bodies[local];
+    body.state.history.clear();
+    if problem.settings.integrator == Integrator::Bdf2 && work.island.contacts.is_empty() {
+        let DeformableState { x, v, history, .. } = &mut body.state;
+        history.h = h;
+        history.x.clone_from(x);
+        history.v.clone_from(v);
+    }
     let in_flight = work.island.contacts.active() == 0;
     problem.end_velocities(in_flight, &mut body.state.v);
     body.state.x.clone_from(&problem.current.x);

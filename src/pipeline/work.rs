@@ -102,14 +102,15 @@ impl BodyWork {
     }
 
     /// Puts a body whose state is no number back to where its last step left it.
-    pub fn roll_back(&self, body: &mut DeformableBody, h: f64) {
+    pub fn roll_back(&self, body: &mut DeformableBody) {
         let Some(problem) = self.problem.as_ref().filter(|p| p.model.id == body.model.id) else { return };
         if !problem.current.x.iter().all(is_number) {
             return;
         }
-        let DeformableState { x, v, contacts, closure, .. } = &mut body.state;
+        let DeformableState { x, v, contacts, closure, history, .. } = &mut body.state;
+        history.clear();
         for (i, (new, old)) in problem.current.x.iter().zip(&problem.x_start).enumerate() {
-            (x[i], v[i]) = (*new, (new - old) / h);
+            (x[i], v[i]) = (*new, (new - old) / problem.h());
         }
         contacts.clear();
         closure.clear();
@@ -126,7 +127,7 @@ impl BodyWork {
         self.rows.clear();
         self.pairs = 0;
         let Some(problem) = &self.problem else { return };
-        let (model, x) = (&problem.model, &problem.x_start);
+        let (model, x) = (&problem.model, &body.state.x);
         self.detector.begin(model, x, &problem.target);
         self.extent = self.detector.aabb(model, x);
         candidates.near(&self.extent, &mut self.near);
@@ -160,7 +161,7 @@ impl BodyWork {
     pub fn look_ahead(&mut self, body: &DeformableBody, scene: &RapierScene, candidates: &Candidates) {
         self.ahead.clear();
         let Some(problem) = self.problem.as_ref().filter(|_| self.rows.is_empty()) else { return };
-        let x = &problem.x_start;
+        let x = &body.state.x;
         let mean = body.state.v.iter().sum::<Vec3>() / x.len() as f64;
         let points = problem.model.surface.nodes.iter().map(|&n| x[n as usize]);
         let shift = mean * LOOK_AHEAD;
@@ -176,6 +177,11 @@ impl BodyWork {
                 *body = place;
             }
         }
+    }
+
+    /// Whether anything may touch the body in this step, or holds it.
+    pub fn is_touched(&self) -> bool {
+        !(self.rows.is_empty() && self.tied.is_empty())
     }
 
     /// Tells where the body's factor is kept in this step.

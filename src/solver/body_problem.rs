@@ -9,7 +9,9 @@ use super::factor_cache::{FactorId, SystemFactor};
 use super::metric::Metric;
 use super::system::FactorKey;
 use crate::body::elastic::{self, Elements, StiffnessDamping};
-use crate::body::{DeformableBody, DeformableModel, Frames, Solver, SolverSettings, SystemMatrix};
+use crate::body::{
+    DeformableBody, DeformableModel, Frames, Integrator, Solver, SolverSettings, SystemMatrix,
+};
 use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3, rotation_from_vector, skew};
 use std::sync::Arc;
@@ -19,6 +21,9 @@ const FLOATING_LIMIT: f64 = 20.0 * std::f64::consts::PI / 180.0;
 
 /// Error of the body's frame \[rad\] beyond which it is refreshed within a step.
 const FRAME_ERROR: f64 = 1.0e-4;
+
+/// Step of the matrix over that of time, of the second order.
+pub(crate) const SECOND_ORDER: f64 = 2.0 / 3.0;
 
 /// Largest turn \[rad\] that [`BodyProblem::balance`] takes for the rest of an iteration.
 const MAX_BALANCING_TURN: f64 = 0.1;
@@ -35,10 +40,16 @@ pub(crate) struct BodyProblem {
     pub settings: SolverSettings,
     material: DeformableMaterial,
     activation: f64,
+    /// The step that the matrix is of \[s\], and that by which time goes on.
     h: f64,
-    /// Positions at the start of the step.
+    dt: f64,
+    /// Goes forward by two steps.
+    is_second_order: bool,
+    /// Positions and velocities at the start of the step; of the second order what they amount to.
     pub x_start: Vec<Vec3>,
     pub v_start: Vec<Vec3>,
+    /// Angular momentum at the start.
+    spin: Vec3,
     /// Where the nodes would go without internal and contact forces.
     pub target: Vec<Vec3>,
     masses: Vec<f64>,
@@ -89,8 +100,11 @@ impl BodyProblem {
             material: body.material,
             activation: body.activation,
             h,
+            dt: h,
+            is_second_order: false,
             x_start: Vec::new(),
             v_start: Vec::new(),
+            spin: Vec3::zeros(),
             target: Vec::new(),
             masses: Vec::new(),
             damping: StiffnessDamping::default(),
@@ -113,7 +127,24 @@ impl BodyProblem {
 
     /// As [`BodyProblem::new`], in the memory of an earlier step.
     pub fn begin(&mut self, body: &DeformableBody, h: f64, gravity: &Vec3) {
+        let history = &body.state.history;
+        let continues = history.h == h && history.x.len() == body.state.x.len();
+        self.is_second_order = continues && body.settings().integrator == Integrator::Bdf2;
+        self.dt = h;
+        self.take_in(body, gravity);
+    }
+
+    /// Begins again by implicit Euler, if it had not been so: the body is touched.
+    pub fn begin_first_order(&mut self, body: &DeformableBody, gravity: &Vec3) {
+        if self.is_second_order {
+            self.is_second_order = false;
+            self.take_in(body, gravity);
+        }
+    }
+
+    fn take_in(&mut self, body: &DeformableBody, gravity: &Vec3) {
         let n = body.state.x.len();
+        let h = if self.is_second_order { SECOND_ORDER * self.dt } else { self.dt };
         self.key.update(body, h);
         self.settings = *body.settings();
         self.material = body.material;
@@ -124,13 +155,21 @@ impl BodyProblem {
         self.metric.effort = Effort::default();
         self.x_start.clone_from(&body.state.x);
         self.v_start.clone_from(&body.state.v);
+        self.spin = Vec3::from(body.angular_momentum());
+        if self.is_second_order {
+            let history = &body.state.history;
+            let starts = self.x_start.iter_mut().zip(&history.x);
+            starts.chain(self.v_start.iter_mut().zip(&history.v)).for_each(|(now, before)| {
+                *now += (*now - before) / 3.0;
+            });
+        }
         self.masses.clear();
         self.masses.extend((0..n).map(|i| body.node_mass(i)));
         let g = gravity * body.gravity_scale();
         self.target.clear();
         let to_target = |i: usize| {
             let acceleration = g + body.forces.get(i).map_or(Vec3::zeros(), |f| f / self.masses[i]);
-            body.state.x[i] + body.state.v[i] * h + acceleration * (h * h)
+            self.x_start[i] + self.v_start[i] * h + acceleration * (h * h)
         };
         self.target.extend((0..n).map(to_target));
         self.pinned_inertia.clear();
@@ -141,7 +180,7 @@ impl BodyProblem {
         self.contact_force.clear();
         self.contact_force.resize(n, Vec3::zeros());
         self.step.resize(n, Vec3::zeros());
-        self.damping.begin(&self.model, self.material.stiffness_damping, h, &body.state.x);
+        self.damping.begin(&self.model, self.material.stiffness_damping, h, &self.x_start);
         let mass = self.masses.iter().sum::<f64>();
         self.weight = mass * g.norm() / n as f64;
     }
@@ -183,7 +222,7 @@ impl BodyProblem {
         Elements { model: &self.model, material: &self.material, activation: self.activation }
     }
 
-    /// The step \[s\].
+    /// The step \[s\] that the matrix is of.
     pub fn h(&self) -> f64 {
         self.h
     }
@@ -318,20 +357,18 @@ impl BodyProblem {
         let total: f64 = self.masses.iter().sum();
         let mean = |p: &[Vec3]| p.iter().zip(&self.masses).map(|(p, m)| p * *m).sum::<Vec3>() / total;
         let centre = mean(&self.current.x);
-        let (start, start_velocity) = (mean(&self.x_start), mean(&self.v_start));
         let inertial = |i: usize| self.target[i] - self.x_start[i] - self.v_start[i] * self.h;
-        let (mut kept, mut gained, mut lost) = (Vec3::zeros(), Vec3::zeros(), Vec3::zeros());
+        let (mut gained, mut lost) = (Vec3::zeros(), Vec3::zeros());
         let mut inertia = Mat3::zeros();
         for (i, m) in self.masses.iter().enumerate() {
-            let (arm, before) = (self.current.x[i] - centre, self.x_start[i] - start);
-            kept += before.cross(&(self.v_start[i] - start_velocity)) * *m;
+            let arm = self.current.x[i] - centre;
             // External forces act where the nodes are at the end of the step, as in the step itself.
-            gained += arm.cross(&inertial(i)) * (*m / self.h);
+            gained += arm.cross(&inertial(i)) * (*m / (self.h * self.h) * self.dt);
             lost += arm.cross(&v[i]) * *m;
             inertia += (Mat3::identity() * arm.norm_squared() - arm * arm.transpose()) * *m;
         }
-        let drag = 1.0 + self.material.mass_damping * self.h;
-        let missing = (kept + gained) / drag - lost;
+        let drag = 1.0 + self.material.mass_damping * self.dt;
+        let missing = (self.spin + gained) / drag - lost;
         let Some(turn) = inertia.try_inverse().map(|inverse| inverse * missing) else { return };
         // What has no width about some axis has no spin about it, but for roundings.
         if turn.norm() * self.h < MAX_SPIN_GIVEN {

@@ -28,7 +28,7 @@ mod tangent;
 mod tests;
 mod triangular;
 
-pub(crate) use body_problem::BodyProblem;
+pub(crate) use body_problem::{BodyProblem, SECOND_ORDER};
 pub(crate) use contact_system::ContactLimits;
 pub(crate) use factor_cache::{FactorCache, FactorId};
 pub(crate) use island::{Island, IslandReport, ROUNDING};
