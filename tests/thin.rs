@@ -301,3 +301,91 @@ fn cloth_drapes_over_a_ball_and_a_rope_over_a_box() {
         }
     }
 }
+
+#[test]
+fn cloth_and_rope_lie_on_soft_cubes_and_cloths_on_one_another() {
+    let cloth = || DeformableBodyBuilder::cloth([0.15, 0.15], [8, 9], 4e-3);
+    let points: Vec<Vector> = straight(24, 0.6);
+    let bodies = [("cloth", cloth()), ("rope", DeformableBodyBuilder::rope(&points, 0.01))];
+    let soft = DeformableMaterial::new(3e5, 0.3).friction(0.8).mass_damping(3.0);
+    for (name, thin) in bodies {
+        let (mut physics, floor) = world_with_floor(1.0 / 60.0);
+        let mut world = DeformableWorld::new();
+        let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [5; 3]).translation(Vector::Y * 0.2);
+        let cube = world.insert(cube.material(soft).can_sleep(false)).unwrap();
+        let thin = thin.material(soft).translation(Vector::new(0.013, 0.5, 0.007)).can_sleep(false);
+        let thin = world.insert(thin).unwrap();
+        let mut lowest = f64::INFINITY;
+        for _ in 0..480 {
+            world.step(&mut physics);
+            let p = positions(&world.bodies[thin]);
+            let over = p.iter().filter(|p| p[0].abs() < 0.15 && p[2].abs() < 0.15);
+            lowest = lowest.min(over.map(|p| p[1]).fold(f64::INFINITY, f64::min));
+        }
+        let [own, total] = [thin, cube].map(|h| world.bodies[h].mass() * G);
+        let on_floor: f64 = floor_force(&world, floor);
+        let between: f64 = world.pair_contacts().iter().map(|c| f64::from(c.force.y).abs()).sum();
+        let speed = world.bodies[thin].max_speed();
+        println!(
+            "{name} on a cube: lowest {lowest:.4} m, {between:.3} N of {own:.3}, floor {on_floor:.3}, {speed:.1e} m/s"
+        );
+        assert!(lowest > 0.38, "{name}: {lowest}");
+        assert!((on_floor / (own + total) - 1.0).abs() < 1e-3, "{name}: {on_floor}");
+        assert!((between / own - 1.0).abs() < 1e-2, "{name}: {between} of {own}");
+        assert!(speed < 2e-2, "{name}: {speed}");
+    }
+    // Two sheets on the floor: the upper one lies a thickness above the lower one.
+    let (mut physics, floor) = world_with_floor(1.0 / 60.0);
+    let mut world = DeformableWorld::new();
+    let sheets = [0.05f32, 0.15].map(|y| {
+        let sheet = cloth().material(soft).translation(Vector::new(0.02 * y, y, 0.0)).can_sleep(false);
+        world.insert(sheet).unwrap()
+    });
+    for _ in 0..360 {
+        world.step(&mut physics);
+    }
+    let heights = sheets.map(|h| world.bodies[h].center_of_mass()[1]);
+    let weight: f64 = sheets.iter().map(|h| world.bodies[*h].mass() * G).sum();
+    println!("sheets at {heights:?} m, floor {:.5} of {weight:.5} N", floor_force(&world, floor));
+    assert!((heights[0] - 2e-3).abs() < 1e-4 && (heights[1] - 6e-3).abs() < 4e-4, "{heights:?}");
+    assert!((floor_force(&world, floor) / weight - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn sheet_and_rope_that_fall_on_themselves_do_not_pass_through() {
+    let rubber = DeformableMaterial::new(1e6, 0.3).friction(0.5).mass_damping(2.0);
+    let points: Vec<Vector> =
+        (0..=40).map(|k| Vector::new(0.002 * (k % 2) as f32, 0.03 * k as f32 + 0.1, 0.0)).collect();
+    let bodies = [
+        (
+            "strip",
+            DeformableBodyBuilder::cloth([0.4, 0.05], [32, 5], 8e-3)
+                .rotation(Vector::new(0.0, 0.0, std::f32::consts::FRAC_PI_2 + 0.02))
+                .translation(Vector::Y * 0.45),
+            8e-3,
+        ),
+        ("rope", DeformableBodyBuilder::rope(&points, 0.01), 0.02),
+    ];
+    for (name, builder, thickness) in bodies {
+        let (mut physics, floor) = world_with_floor(1.0 / 120.0);
+        let mut world = DeformableWorld::new();
+        let body = world.insert(builder.material(rubber).self_contact(true).can_sleep(false)).unwrap();
+        let mut nearest = f64::INFINITY;
+        for _ in 0..600 {
+            world.step(&mut physics);
+            let contacts = world.pair_contacts().iter().map(|c| c.gap);
+            nearest = nearest.min(contacts.fold(f64::INFINITY, f64::min));
+        }
+        let body = &world.bodies[body];
+        let force = floor_force(&world, floor) / (body.mass() * G);
+        println!(
+            "{name}: deepest into itself {nearest:.1e} m of {thickness} m, floor force {force:.4} of its weight, {:.1e} m/s, centre at {:.3} m",
+            body.max_speed(),
+            body.center_of_mass()[1]
+        );
+        assert!(body.is_enabled());
+        // Not through: less than the distance of the middles.
+        assert!(nearest > -0.5 * thickness, "{name}: {nearest}");
+        assert!((force - 1.0).abs() < 0.05, "{name}: {force}");
+    }
+}

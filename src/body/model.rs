@@ -146,6 +146,11 @@ impl DeformableModel {
         self.tetrahedra.len()
     }
 
+    /// The largest distance of the surface from its nodes \[m\].
+    pub(crate) fn skin(&self) -> f64 {
+        self.half_thickness.iter().copied().fold(0.0, f64::max)
+    }
+
     /// Number of elements of all kinds that have an energy.
     pub(crate) fn element_count(&self) -> usize {
         let solid = if self.is_solid() { self.tetrahedra.len() } else { 0 };

@@ -69,8 +69,8 @@ pub(crate) struct BetweenDetector {
     /// Surface nodes of one body and triangles of the other.
     on_triangles: [Vec<(u32, u32)>; 2],
     edges: Vec<(u32, u32)>,
-    /// Names of the contacts that carried in the last step, ascending.
-    carried: Vec<ContactKey>,
+    /// The contacts that carried in the last step, ascending by their names, with their normals.
+    carried: Vec<(ContactKey, Vec3)>,
     touches: Vec<Touch>,
     /// When each row closes, as part of the step, and how much it closes in all of it \[m\].
     closings: Vec<Closing>,
@@ -114,7 +114,7 @@ impl BetweenDetector {
         self.carried.clear();
         let between = |m: &&ContactMemory| m.key.is_between() && m.key.obstacle == b.key;
         let carried = memory.iter().filter(between).filter(|m| m.force != Vec3::zeros());
-        self.carried.extend(carried.map(|m| m.key));
+        self.carried.extend(carried.map(|m| (m.key, m.geometry.frame[0])));
         let itself = a.key == b.key;
         self.collect(surfaces, itself);
         for (held, surface) in self.held.iter_mut().zip(surfaces) {
@@ -138,7 +138,7 @@ impl BetweenDetector {
         self.cross(pair, surfaces, rows);
         self.drop_late(surfaces, first, rows);
         rows[first..].sort_unstable_by_key(|row| row.key);
-        if !itself {
+        if !itself && surfaces.iter().all(|s| s.model.surface.is_closed()) {
             untangle(surfaces, &self.pairs, rows);
         }
     }
@@ -162,25 +162,29 @@ impl BetweenDetector {
         self.on_triangles.iter_mut().for_each(Vec::clear);
         self.edges.clear();
         let [of_a, of_b] = &mut self.on_triangles;
-        // Every node and every edge is looked at with one of its triangles, whose box holds it.
+        // Every node and every edge is looked at with one of its facets, whose box holds it.
         let index = |s: &SoftSurface<'_>, n: u32| s.model.surface.index_of_node[n as usize];
         let at_node =
-            |s: &SoftSurface<'_>, t: u32, n: u32| s.model.surface.node_triangle[index(s, n) as usize] == t;
-        let on_edge =
-            |s: &SoftSurface<'_>, t: u32, e: u32| s.model.surface.edge_triangles[e as usize][0] == t;
+            |s: &SoftSurface<'_>, t: u32, n: u32| s.model.surface.node_facet[index(s, n) as usize] == t;
+        let is_triangle = |s: &SoftSurface<'_>, t: u32| (t as usize) < s.model.surface.triangles.len();
+        let on_edge = |s: &SoftSurface<'_>, t: u32, e: u32| {
+            !is_triangle(s, t) || s.model.surface.edge_triangles[e as usize][0] == t
+        };
         self.pairs.clear();
         self.pairs.extend(a.tree.pairs(b.tree));
         for &(ta, tb) in &self.pairs {
             let (s, t) = (&a.model.surface, &b.model.surface);
-            let own = s.triangles[ta as usize].iter().filter(|&&n| at_node(a, ta, n));
-            of_a.extend(own.map(|&n| (index(a, n), tb)));
-            if !itself {
-                let own = t.triangles[tb as usize].iter().filter(|&&n| at_node(b, tb, n));
+            if is_triangle(b, tb) {
+                let own = s.facet_nodes(ta as usize).iter().filter(|&&n| at_node(a, ta, n));
+                of_a.extend(own.map(|&n| (index(a, n), tb)));
+            }
+            if !itself && is_triangle(a, ta) {
+                let own = t.facet_nodes(tb as usize).iter().filter(|&&n| at_node(b, tb, n));
                 of_b.extend(own.map(|&n| (index(b, n), ta)));
             }
-            for ea in s.triangle_edges[ta as usize].into_iter().filter(|&e| on_edge(a, ta, e)) {
-                let others = t.triangle_edges[tb as usize].into_iter().filter(|&e| on_edge(b, tb, e));
-                self.edges.extend(others.map(|eb| (ea, eb)).filter(|(ea, eb)| !itself || ea < eb));
+            for &ea in s.facet_edges(ta as usize).iter().filter(|&&e| on_edge(a, ta, e)) {
+                let others = t.facet_edges(tb as usize).iter().filter(|&&e| on_edge(b, tb, e));
+                self.edges.extend(others.map(|&eb| (ea, eb)).filter(|(ea, eb)| !itself || ea < eb));
             }
         }
         for list in [of_a, of_b, &mut self.edges] {
@@ -206,9 +210,10 @@ impl BetweenDetector {
                 if itself && are_neighbours(own, s, t as usize) {
                     continue;
                 }
-                let carried = self.carried.binary_search(&key(t)).is_ok();
+                let last = self.last_normal(&key(t)).map(|normal| if side == 0 { normal } else { -normal });
+                let carried = last.is_some();
                 let room = if carried { STILL_BESIDE } else { BESIDE };
-                let touch = on_triangle(own, s, other, t as usize, room);
+                let touch = on_triangle(own, s, other, t as usize, room, last);
                 let Some(touch) =
                     touch.filter(|touch| carried || itself || !self.is_held(touch, other, 1 - side))
                 else {
@@ -243,6 +248,12 @@ impl BetweenDetector {
         self.on_triangles[side] = list;
     }
 
+    /// The normal of a contact that carried in the last step.
+    fn last_normal(&self, key: &ContactKey) -> Option<Vec3> {
+        let place = self.carried.binary_search_by(|(name, _)| name.cmp(key));
+        place.ok().map(|k| self.carried[k].1)
+    }
+
     /// Whether the nodes of a triangle have rows already that keep it from what touches it.
     fn is_held(&self, touch: &Touch, surface: &SoftSurface<'_>, side: usize) -> bool {
         surface.model.surface.triangles[touch.triangle].iter().all(|&n| {
@@ -261,9 +272,10 @@ impl BetweenDetector {
                 continue;
             }
             let key = ContactKey { obstacle: b.key, part: eb, feature: ea, slot: EDGES };
-            let carried = self.carried.binary_search(&key).is_ok();
+            let last = self.last_normal(&key);
+            let carried = last.is_some();
             let room = if carried { CARRYING_EDGES } else { NEW_EDGES };
-            let Some(crossing) = crossing(a, ea as usize, b, eb as usize, room) else { continue };
+            let Some(crossing) = crossing(a, ea as usize, b, eb as usize, room, last) else { continue };
             let holds = |side: usize| {
                 nodes[side].iter().all(|&n| {
                     let index = surfaces[side].model.surface.index_of_node[n as usize] as usize;
@@ -301,23 +313,30 @@ impl SoftPair {
 }
 
 /// Surface node `s` of one body on triangle `t` of another, where it comes to lie within the step, or misses
-/// it by no more than `room`.
+/// it by no more than `room`. A sheet's triangle has two sides: the node is on that where it was `last`, else where it
+/// is at the start of the step.
 fn on_triangle(
     own: &SoftSurface<'_>,
     s: usize,
     other: &SoftSurface<'_>,
     t: usize,
     room: f64,
+    last: Option<Vec3>,
 ) -> Option<Touch> {
     let node = own.model.surface.nodes[s] as usize;
     let nodes = other.model.surface.triangles[t].map(|n| n as usize);
     let corners = nodes.map(|n| other.x[n]);
     let [a, b, c] = corners;
-    let normal = other.faces[t];
-    if normal == Vec3::zeros() || normal.dot(&own.normals[s]) > FACING {
+    let x = own.x[node];
+    let mut normal = other.faces[t];
+    if t >= other.model.surface.closed {
+        let side = last.unwrap_or(x - a);
+        normal *= if normal.dot(&side) < 0.0 { -1.0 } else { 1.0 };
+    }
+    let looks_away = !own.model.surface.is_thin[s] && normal.dot(&own.normals[s]) > FACING;
+    if normal == Vec3::zeros() || looks_away {
         return None;
     }
-    let x = own.x[node];
     let height = normal.dot(&(x - a));
     let index = |n: usize| other.model.surface.index_of_node[n] as usize;
     let reach = own.reach[s] + nodes.iter().fold(0.0, |r: f64, &n| r.max(other.reach[index(n)]));
@@ -340,7 +359,8 @@ fn on_triangle(
     let sum: f64 = weights.iter().sum();
     let weights = weights.map(|w| w / sum);
     let foot = a * weights[0] + b * weights[1] + c * weights[2];
-    let gap = normal.dot(&(x - foot));
+    let skins = nodes.iter().zip(weights).map(|(&n, w)| other.model.half_thickness[n] * w).sum::<f64>();
+    let gap = normal.dot(&(x - foot)) - skins - own.model.half_thickness[node];
     Some(Touch { triangle: t, weights, normal, gap, miss, closing })
 }
 

@@ -29,13 +29,15 @@ pub(super) struct Crossing {
     pub closing: Closing,
 }
 
-/// Edges of two bodies that cross within the step, or nearly.
+/// Edges of two bodies that cross within the step, or nearly. Edges of sheets and rods have no outside: they are
+/// on the side of one another where they were `last`, else where they are at the start of the step.
 pub(super) fn crossing(
     a: &SoftSurface<'_>,
     ea: usize,
     b: &SoftSurface<'_>,
     eb: usize,
     room: Room,
+    last: Option<Vec3>,
 ) -> Option<Crossing> {
     let ends = |s: &SoftSurface<'_>, e: usize| s.model.surface.edges[e].map(|n| n as usize);
     let ([i, j], [k, l]) = (ends(a, ea), ends(b, eb));
@@ -56,17 +58,22 @@ pub(super) fn crossing(
     if !(height.abs() < reach.max(deepest)) {
         return None;
     }
-    let faces =
-        |s: &SoftSurface<'_>, e: usize| s.model.surface.edge_triangles[e].map(|t| s.faces[t as usize]);
+    // Of what is not there, none.
+    let face = |s: &SoftSurface<'_>, t: u32| s.faces.get(t as usize).copied().unwrap_or_default();
+    let faces = |s: &SoftSurface<'_>, e: usize| s.model.surface.edge_triangles[e].map(|t| face(s, t));
     let [outward_a, outward_b] = [faces(a, ea), faces(b, eb)];
+    let thin = [a.model.surface.is_thin_edge(ea), b.model.surface.is_thin_edge(eb)];
     // From b to a: into a, out of b.
-    let towards = outward_b[0] + outward_b[1] - outward_a[0] - outward_a[1];
+    let towards = match thin {
+        [false, false] => outward_b[0] + outward_b[1] - outward_a[0] - outward_a[1],
+        _ => last.unwrap_or(normal * height),
+    };
     let sign = if towards.dot(&normal) < 0.0 { -1.0 } else { 1.0 };
     let (normal, height) = (normal * sign, height * sign);
     let within = height < reach && height > -deepest;
     if !within
-        || !looks_along(a, ea, &outward_a, &-normal, room.askew)
-        || !looks_along(b, eb, &outward_b, &normal, room.askew)
+        || !(thin[0] || looks_along(a, ea, &outward_a, &-normal, room.askew))
+        || !(thin[1] || looks_along(b, eb, &outward_b, &normal, room.askew))
     {
         return None;
     }
@@ -83,7 +90,11 @@ pub(super) fn crossing(
     let s = w.cross(&v).dot(&across) / squared;
     let t = w.cross(&u).dot(&across) / squared;
     let inside = |t: f64| t > -room.beside && t < 1.0 + room.beside;
-    (inside(s) && inside(t)).then_some(Crossing { places: [s, t], normal, gap: height, closing })
+    let skin = |s: &SoftSurface<'_>, [i, j]: [usize; 2], t: f64| {
+        s.model.half_thickness[i] * (1.0 - t) + s.model.half_thickness[j] * t
+    };
+    let gap = height - skin(a, [i, j], s) - skin(b, [k, l], t);
+    (inside(s) && inside(t)).then_some(Crossing { places: [s, t], normal, gap, closing })
 }
 
 /// Whether a direction across an edge is between the normals of its two triangles, or nearly; of an edge that

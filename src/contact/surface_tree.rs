@@ -1,4 +1,4 @@
-//! Which triangles of two surfaces may meet within a step: trees over the boxes that they sweep,
+//! Which facets of two surfaces, triangles and segments of rods, may meet within a step: trees over the boxes that they sweep,
 //! refitted from step to step.
 
 use crate::body::DeformableModel;
@@ -6,7 +6,7 @@ use crate::math::{Vec3, to_real};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 
-/// A tree over the triangles of one surface.
+/// A tree over the facets of one surface.
 #[derive(Default)]
 pub(crate) struct SurfaceTree {
     tree: Bvh,
@@ -17,12 +17,12 @@ pub(crate) struct SurfaceTree {
 const ROUNDING: f32 = 2.5e-7;
 
 impl SurfaceTree {
-    /// Takes in the triangles on their way from `x` to `target`, with `margin` \[m\] around them.
+    /// Takes in the facets on their way from `x` to `target`, with `margin` \[m\] around them.
     pub fn update(&mut self, model: &DeformableModel, x: &[Vec3], target: &[Vec3], margin: f64) {
         self.boxes.clear();
-        for triangle in &model.surface.triangles {
+        for facet in 0..model.surface.facet_count() {
             let way = |&n: &u32| [to_real(&x[n as usize]), to_real(&target[n as usize])];
-            let swept = Aabb::from_points(triangle.iter().flat_map(way));
+            let swept = Aabb::from_points(model.surface.facet_nodes(facet).iter().flat_map(way));
             let rounding = ROUNDING * swept.mins.abs().max(swept.maxs.abs()).max_element();
             self.boxes.push(swept.loosened(margin as f32 + rounding));
         }
@@ -36,7 +36,7 @@ impl SurfaceTree {
         self.tree.refit_without_opt();
     }
 
-    /// Pairs of triangles, of this surface and of `other`, whose boxes meet. In no order; but which ones does not
+    /// Pairs of facets, of this surface and of `other`, whose boxes meet. In no order; but which ones does not
     /// depend on how the trees have grown.
     pub fn pairs<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = (u32, u32)> + 'a {
         let met = self.tree.leaf_pairs(&other.tree, |a, b| a.intersects(b));

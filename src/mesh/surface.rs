@@ -24,8 +24,10 @@ pub(crate) struct Surface {
     pub triangle_edges: Vec<[u32; 3]>,
     /// The two triangles on each edge; [`NONE`] beyond the border of a sheet and along rods.
     pub edge_triangles: Vec<[u32; 2]>,
-    /// A triangle at each surface node; [`NONE`] along rods.
-    pub node_triangle: Vec<u32>,
+    /// Edges without triangles, of rods: with the triangles they are the facets of the surface.
+    pub segments: Vec<u32>,
+    /// A facet at each surface node: a triangle, or beyond their number a segment.
+    pub node_facet: Vec<u32>,
     /// Whether each surface node is on sheets and rods only, which have no outside.
     pub is_thin: Vec<bool>,
     /// Index into `nodes` per mesh node; `u32::MAX` inside the body.
@@ -63,9 +65,15 @@ impl Surface {
                 pair[usize::from(pair[0] != NONE)] = t as u32;
             }
         }
-        let mut node_triangle = vec![NONE; nodes.len()];
+        let alone = (0..edges.len()).filter(|&e| edge_triangles[e][0] == NONE);
+        let segments: Vec<u32> = alone.map(|e| e as u32).collect();
+        let mut node_facet = vec![NONE; nodes.len()];
+        let mut stand = |n: u32, facet: usize| node_facet[index_of_node[n as usize] as usize] = facet as u32;
+        for (s, &e) in segments.iter().enumerate() {
+            edges[e as usize].iter().for_each(|&n| stand(n, triangles.len() + s));
+        }
         for (t, triangle) in triangles.iter().enumerate() {
-            triangle.iter().for_each(|&n| node_triangle[index_of_node[n as usize] as usize] = t as u32);
+            triangle.iter().for_each(|&n| stand(n, t));
         }
         let mut is_thin = vec![true; nodes.len()];
         triangles[..closed]
@@ -81,11 +89,37 @@ impl Surface {
             edges,
             triangle_edges,
             edge_triangles,
-            node_triangle,
+            segments,
+            node_facet,
             is_thin,
             index_of_node,
             mean_edge,
         }
+    }
+
+    /// Nodes of a facet.
+    pub fn facet_nodes(&self, facet: usize) -> &[u32] {
+        match self.triangles.get(facet) {
+            Some(triangle) => triangle,
+            None => &self.edges[self.segments[facet - self.triangles.len()] as usize],
+        }
+    }
+
+    /// Edges of a facet.
+    pub fn facet_edges(&self, facet: usize) -> &[u32] {
+        match self.triangle_edges.get(facet) {
+            Some(edges) => edges,
+            None => std::slice::from_ref(&self.segments[facet - self.triangles.len()]),
+        }
+    }
+
+    pub fn facet_count(&self) -> usize {
+        self.triangles.len() + self.segments.len()
+    }
+
+    /// Whether an edge is of sheets and rods only.
+    pub fn is_thin_edge(&self, edge: usize) -> bool {
+        self.edge_triangles[edge].iter().all(|&t| t as usize >= self.closed)
     }
 
     /// Whether all of it bounds solids.

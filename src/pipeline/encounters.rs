@@ -140,11 +140,6 @@ impl Encounters {
         };
         for (i, (aabb, place)) in self.boxes.iter().enumerate() {
             let own = &deformables[handle(*place)];
-            // What has no inside has no outside either, which contact between deformables asks for.
-            let closed = |body: &DeformableBody| body.model.surface.is_closed();
-            if !closed(own) {
-                continue;
-            }
             if own.self_contact() && *place < works.len() {
                 add([*place; 2], pair_of(own, own));
             }
@@ -158,7 +153,7 @@ impl Encounters {
                 let handles = ends.map(handle);
                 let [a, b] = handles.map(|h| &deformables[h]);
                 let collide = a.collision_groups().test(b.collision_groups());
-                if collide && closed(a) && closed(b) && self.tied.binary_search(&handles).is_err() {
+                if collide && self.tied.binary_search(&handles).is_err() {
                     add(ends, pair_of(a, b));
                 }
             }

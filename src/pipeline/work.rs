@@ -54,7 +54,7 @@ impl BodyWork {
 
     /// Distance within which a body looks for contacts even without motion \[m\].
     pub fn margin(body: &DeformableBody) -> f32 {
-        (STATIC_MARGIN * body.model.surface.mean_edge) as f32
+        (STATIC_MARGIN * body.model.surface.mean_edge + body.model.skin()) as f32
     }
 
     /// Takes a sleeping body in as an obstacle.
