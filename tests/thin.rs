@@ -123,7 +123,9 @@ fn rods_and_sheets_bend_as_beams_do() {
     // A strip of Poisson's ratio 0 is a beam of I = b t³/12: but for the hinges' own ratio of −1/3 across,
     // which makes it softer by 8/9.
     let thickness = 4e-3;
-    for (half_width, cells) in [(0.0217, [40, 4]), (0.065, [40, 12]), (0.0325, [80, 12])] {
+    // The last one's triangles are higher than equilateral ones by 15 %.
+    let strips = [(0.0217, [40, 4]), (0.065, [40, 12]), (0.0325, [80, 12]), (0.025, [40, 4])];
+    for (half_width, cells) in strips {
         let newton = SolverSettings { solver: Solver::Newton, ..SolverSettings::default() };
         let strip = DeformableBodyBuilder::cloth([0.25, half_width], cells, thickness);
         let strip = strip.material(material).settings(newton);
@@ -135,7 +137,8 @@ fn rods_and_sheets_bend_as_beams_do() {
         let expected = 1000.0 * G * free.powi(4) / (8.0 * e * f64::from(thickness).powi(2) / 12.0);
         println!("strip {half_width} m wide, {cells:?}: {drop:.5} m, beam {expected:.5} m");
         // Somewhere between held flat across (1) and free to bend across (9/8).
-        assert!((0.99..1.13).contains(&(drop / expected)), "{drop} {expected}");
+        let softest = if half_width == 0.025 { 1.3 } else { 1.13 };
+        assert!((0.99..softest).contains(&(drop / expected)), "{drop} {expected}");
     }
 }
 

@@ -470,7 +470,9 @@ impl DeformableBody {
             Acceleration::Lbfgs { window } | Acceleration::Anderson { window } => {
                 *window = (*window).clamp(1, 16);
             }
-            Acceleration::Chebyshev { radius } => *radius = radius.max(0.0).min(0.9999),
+            Acceleration::Chebyshev { radius } => {
+                *radius = if radius.is_nan() { 0.0 } else { radius.clamp(0.0, 0.9999) };
+            }
             Acceleration::None => {}
         }
         self.settings = settings;

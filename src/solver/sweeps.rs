@@ -130,7 +130,7 @@ mod tests {
         fn everything_agrees_with_its_dense_twin(
             n in 1usize..25, seed in proptest::collection::vec(-1.0..1.0f64, 120),
         ) {
-            let entry = |i: usize, j: usize| if (i + 2 * j) % 3 == 0 { seed[(i * 7 + j * 11) % seed.len()] } else { 0.0 };
+            let entry = |i: usize, j: usize| if (i + 2 * j).is_multiple_of(3) { seed[(i * 7 + j * 11) % seed.len()] } else { 0.0 };
             let (mut starts, mut rows, mut values) = (vec![0], vec![], vec![]);
             let mut A = DMatrix::zeros(n, n);
             for j in 0..n {
