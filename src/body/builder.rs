@@ -139,6 +139,12 @@ impl DeformableBodyBuilder {
         }
     }
 
+    /// Smooths the tetrahedra over their edges, see [`DeformableModel::smoothed`].
+    pub fn smoothed(mut self) -> Self {
+        self.model = self.model.map(|model| Arc::new((*model).clone().smoothed()));
+        self
+    }
+
     /// Sets the material.
     pub fn material(mut self, material: DeformableMaterial) -> Self {
         self.material = material;

@@ -48,13 +48,27 @@ impl StiffnessDamping {
 
 vectorized! {
 fn push_stretches[](model: &DeformableModel, x: &[Vec3], stretches: &mut Vec<LaneMat3>) {
-    for block in &model.blocks {
-        let F = deformation_gradient(block, x);
+    for block in 0..solid_blocks(model) {
+        let F = solid_gradient(model, block, x);
         let S = transpose_mul(&polar_rotations(&F), &F);
         // Symmetric but for roundings.
         stretches.push(LaneMat3(std::array::from_fn(|k| (S.0[k] + S.at(k / 3, k % 3)) * 0.5)));
     }
 }
+}
+
+/// Blocks of tetrahedra, or of the patches that stand for them.
+#[inline(always)]
+fn solid_blocks(model: &DeformableModel) -> usize {
+    if model.is_smoothed() { model.patches.block_count() } else { model.blocks.len() }
+}
+
+#[inline(always)]
+fn solid_gradient(model: &DeformableModel, block: usize, x: &[Vec3]) -> LaneMat3 {
+    match model.is_smoothed() {
+        true => model.patches.deformation_gradient(block, x),
+        false => deformation_gradient(&model.blocks[block], x),
+    }
 }
 
 /// Blocks that go through the stages of the element loop together.
@@ -81,8 +95,9 @@ pub(crate) fn add_forces(
     force: &mut [Vec3],
 ) -> Elastic {
     let Elements { model, material, .. } = elements;
-    let mut elastic = with_energy!(material, energy => {
-        sum_elements(energy, model, material, damping, x, frame, limit, force)
+    let mut elastic = with_energy!(material, energy => match model.is_smoothed() {
+        true => sum_patches(energy, model, material, damping, x, frame, limit, force),
+        false => sum_elements(energy, model, material, damping, x, frame, limit, force),
     });
     if !(model.triangles.is_empty() && model.stencils.is_empty()) {
         elastic.energy += thin::add_forces(elements, &damping.thin, damping.ratio, x, force);
@@ -122,13 +137,7 @@ fn sum_elements[E: ElementEnergy](
                 response.stress = response.stress.plus_scaled(&stress, Lane::splat(damping.ratio));
             }
             total += response.density * block.volumes;
-            let mut trace = Lane::default();
-            for c in 0..3 {
-                for r in 0..3 {
-                    trace = response.rotation.at(r, c).mul_add(Lane::splat(frame[(r, c)]), trace);
-                }
-            }
-            least_trace = least_trace.zip(trace, f64::min);
+            least_trace = least_trace.zip(turn_trace(&response.rotation, frame), f64::min);
             *F = response.stress;
         }
         if total.sum() > limit {
@@ -141,6 +150,53 @@ fn sum_elements[E: ElementEnergy](
     let least_trace = least_trace.0.into_iter().fold(3.0, f64::min);
     Elastic { energy: total.sum(), least_trace }
 }
+}
+
+vectorized! {
+fn sum_patches[E: ElementEnergy](
+    energy: E,
+    model: &DeformableModel,
+    material: &DeformableMaterial,
+    damping: &StiffnessDamping,
+    x: &[Vec3],
+    frame: &Mat3,
+    limit: f64,
+    force: &mut [Vec3],
+) -> Elastic {
+    let lame = material.lame();
+    let patches = &model.patches;
+    let mut total = Lane::default();
+    let mut least_trace = Lane::splat(3.0);
+    for block in 0..patches.block_count() {
+        let F = patches.deformation_gradient(block, x);
+        let mut response = energy.evaluate(&F);
+        if let Some(stretch) = damping.stretches.get(block) {
+            let (density, stress) = damping_response(lame, stretch, &F, &response.rotation);
+            response.density += density * damping.ratio;
+            response.stress = response.stress.plus_scaled(&stress, Lane::splat(damping.ratio));
+        }
+        total += response.density * patches.volumes[block];
+        least_trace = least_trace.zip(turn_trace(&response.rotation, frame), f64::min);
+        patches.scatter_forces(block, &response.stress, force);
+        if total.sum() > limit {
+            return Elastic { energy: f64::INFINITY, least_trace: 3.0 };
+        }
+    }
+    let least_trace = least_trace.0.into_iter().fold(3.0, f64::min);
+    Elastic { energy: total.sum(), least_trace }
+}
+}
+
+/// `tr(QᵀR)`.
+#[inline(always)]
+fn turn_trace(rotation: &LaneMat3, frame: &Mat3) -> Lane {
+    let mut trace = Lane::default();
+    for c in 0..3 {
+        for r in 0..3 {
+            trace = rotation.at(r, c).mul_add(Lane::splat(frame[(r, c)]), trace);
+        }
+    }
+    trace
 }
 
 /// Asks for a block that will be needed soon.

@@ -11,6 +11,7 @@ mod builder;
 pub(crate) mod elastic;
 mod elements;
 mod model;
+pub(crate) mod patches;
 mod set;
 mod settings;
 mod sleep;

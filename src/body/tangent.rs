@@ -2,6 +2,7 @@
 //! constant matrix.
 
 use super::elastic::Elements;
+use super::patches::deformation_gradient;
 use super::thin::keeper;
 use crate::energy::membrane::{Membrane, MembraneMode};
 use crate::energy::{ElementEnergy, Mode, modes, with_energy};
@@ -18,7 +19,22 @@ pub(crate) fn add_tangents(
 ) {
     let Elements { model, material, activation } = elements;
     let kept = |stiffness: f64| if projected { stiffness.max(0.0) } else { stiffness };
-    for (e, tet) in model.tetrahedra.iter().enumerate().take(LANES * model.blocks.len()) {
+    for (corners, volume) in model.patches.iter() {
+        let F = deformation_gradient(&corners, x);
+        let modes: [Mode; 9] = with_energy!(material, energy => modes(&F, |s| energy.principal(s)));
+        for (i, a) in &corners {
+            for (j, b) in &corners {
+                let mut block = Mat3::zeros();
+                for mode in &modes {
+                    let weight = kept(mode.stiffness) * volume;
+                    block += (mode.shape * a) * (mode.shape * b * weight).transpose();
+                }
+                add(*i as usize, *j as usize, &block);
+            }
+        }
+    }
+    let solid = if model.is_smoothed() { 0 } else { LANES * model.blocks.len() };
+    for (e, tet) in model.tetrahedra.iter().enumerate().take(solid) {
         let block = &model.blocks[e / LANES];
         let gradients = block.shape_gradients(e % LANES);
         let volume = block.volumes.0[e % LANES];
@@ -108,7 +124,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// A block with a skin, a rope and muscles, and a network: every kind of element.
-    fn models() -> [DeformableModel; 2] {
+    fn models() -> [DeformableModel; 3] {
         let block = TetMesh::cuboid([0.1; 3], [1, 1, 2]).unwrap();
         let faces = [[0, 1, 2]];
         let mixed = Structure::solid(&block).with_sheet(&faces, 0.01).unwrap();
@@ -119,6 +135,7 @@ mod tests {
             [-0.2, 0.0, 0.2].iter().flat_map(|&z| [-0.2, 0.1].map(|x: f64| [x, x * x + z * z, z])).collect();
         let shell = Structure::sheet(arch, &[[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]], 0.01);
         [
+            DeformableModel::new(&block).smoothed(),
             DeformableModel::from_structure(&mixed).unwrap().with_fibres(|_| [1.0, 0.5, 0.0]),
             DeformableModel::from_structure(&shell.unwrap()).unwrap(),
         ]

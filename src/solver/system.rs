@@ -76,7 +76,7 @@ pub(crate) fn symbolic(model: &DeformableModel, system: SystemMatrix) -> Option<
     let n = model.rest.len();
     let (mut starts, mut rows) = (vec![0], Vec::new());
     for i in 0..n {
-        let above = model.adjacency[i].iter().map(|&j| j as usize).filter(|&j| j < i);
+        let above = model.coupling[i].iter().map(|&j| j as usize).filter(|&j| j < i);
         let above: Vec<usize> = above.collect();
         for r in 0..d {
             rows.extend(above.iter().flat_map(|&j| (0..d).map(move |c| d * j + c)));
@@ -100,21 +100,31 @@ pub(crate) fn assemble(
     let stiffening = 1.0 + material.stiffness_damping / h;
     let lame = material.lame();
     let weight = with_energy!(material, energy => energy.laplacian_weight());
-    for (e, tet) in model.tetrahedra.iter().enumerate().take(LANES * model.blocks.len()) {
+    let mut add = |i: u32, j: u32, a: &Vec3, b: &Vec3, volume: f64| {
+        let stiffness = match system {
+            SystemMatrix::Laplacian => Mat3::from_diagonal_element(weight * a.dot(b)),
+            SystemMatrix::RestStiffness => {
+                (Mat3::from_diagonal_element(a.dot(b)) + b * a.transpose()) * lame.mu
+                    + a * b.transpose() * lame.lambda
+            }
+        };
+        matrix.add_elastic(i as usize, j as usize, &(stiffness * volume));
+    };
+    for (corners, volume) in model.patches.iter() {
+        for (i, a) in &corners {
+            for (j, b) in &corners {
+                add(*i, *j, a, b, volume * stiffening);
+            }
+        }
+    }
+    let solid = if model.is_smoothed() { 0 } else { LANES * model.blocks.len() };
+    for (e, tet) in model.tetrahedra.iter().enumerate().take(solid) {
         let block = &model.blocks[e / LANES];
-        let lane = e % LANES;
-        let g: [Vec3; 4] = block.shape_gradients(lane);
-        let volume = block.volumes.0[lane] * stiffening;
+        let g: [Vec3; 4] = block.shape_gradients(e % LANES);
+        let volume = block.volumes.0[e % LANES] * stiffening;
         for a in 0..4 {
             for b in 0..4 {
-                let stiffness = match system {
-                    SystemMatrix::Laplacian => Mat3::from_diagonal_element(weight * g[a].dot(&g[b])),
-                    SystemMatrix::RestStiffness => {
-                        (Mat3::from_diagonal_element(g[a].dot(&g[b])) + g[b] * g[a].transpose()) * lame.mu
-                            + g[a] * g[b].transpose() * lame.lambda
-                    }
-                };
-                matrix.add_elastic(tet[a] as usize, tet[b] as usize, &(stiffness * volume));
+                add(tet[a], tet[b], &g[a], &g[b], volume);
             }
         }
     }

@@ -1,0 +1,160 @@
+//! Tetrahedra smoothed over their edges [Liu et al. 2009; He et al. 2013]: around every edge one deformation
+//! gradient, the mean of those of the tetrahedra that share it, and the energy of that. Linear tetrahedra by
+//! themselves are too stiff, in bending most of all; their means are not.
+//!
+//! An edge's patch is an element like any other, of all nodes of its tetrahedra, with the means of their shape
+//! gradients: `F = Σ x_a g_aᵀ`, `f_a = −V P(F) g_a`.
+
+use crate::math::lanes::{LANES, Lane, LaneMat3};
+use crate::math::{Mat3, Vec3};
+use std::collections::BTreeMap;
+
+/// All patches of a body, four side by side.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Patches {
+    /// First corner of each block, and the number of corners last.
+    starts: Vec<u32>,
+    corners: Vec<PatchCorner>,
+    /// A sixth of the volumes of the tetrahedra around each edge \[m³\]; zero in lanes that fill up.
+    pub volumes: Vec<Lane>,
+    /// Number of patches.
+    pub count: usize,
+}
+
+/// One node of each of four patches.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PatchCorner {
+    nodes: [u32; LANES],
+    /// Mean gradient of the node's shape function [1/m]; zero for what fills up.
+    gradient: [Lane; 3],
+}
+
+/// One patch while it is being put together: gradients by nodes, times the volumes that they are of.
+#[derive(Clone, Default)]
+struct Patch {
+    gradients: BTreeMap<u32, Vec3>,
+    volume: f64,
+}
+
+impl Patches {
+    /// Of tetrahedra with the gradients of their shape functions and their volumes.
+    pub fn new(tetrahedra: impl Iterator<Item = ([u32; 4], [Vec3; 4], f64)>) -> Self {
+        let mut by_edge: BTreeMap<[u32; 2], Patch> = BTreeMap::new();
+        for (nodes, gradients, volume) in tetrahedra {
+            for i in 0..4 {
+                for j in 0..i {
+                    let edge = [nodes[i].min(nodes[j]), nodes[i].max(nodes[j])];
+                    let patch = by_edge.entry(edge).or_default();
+                    patch.volume += volume / 6.0;
+                    for (&n, g) in nodes.iter().zip(&gradients) {
+                        *patch.gradients.entry(n).or_default() += g * (volume / 6.0);
+                    }
+                }
+            }
+        }
+        let mut all: Vec<Patch> = by_edge.into_values().collect();
+        // Equal numbers of nodes side by side; among those, neighbours in memory.
+        all.sort_by_key(|p| (p.gradients.len(), p.gradients.keys().sum::<u32>()));
+        let mut patches = Self { starts: vec![0], count: all.len(), ..Self::default() };
+        for block in all.chunks(LANES) {
+            let count = block.iter().map(|p| p.gradients.len()).max().unwrap_or(0);
+            let mut corners =
+                vec![PatchCorner { nodes: [0; LANES], gradient: [Lane::default(); 3] }; count];
+            let mut volumes = Lane::default();
+            for i in 0..LANES {
+                // The last block is filled up with copies of its last patch, without volume.
+                let patch = &block[i.min(block.len() - 1)];
+                if i < block.len() {
+                    volumes.0[i] = patch.volume;
+                }
+                let last = patch.gradients.keys().next_back().copied().unwrap_or(0);
+                for (k, corner) in corners.iter_mut().enumerate() {
+                    let own = patch.gradients.iter().nth(k);
+                    corner.nodes[i] = own.map_or(last, |(n, _)| *n);
+                    for c in 0..3 {
+                        corner.gradient[c].0[i] = own.map_or(0.0, |(_, g)| g[c] / patch.volume);
+                    }
+                }
+            }
+            patches.corners.extend(corners);
+            patches.starts.push(patches.corners.len() as u32);
+            patches.volumes.push(volumes);
+        }
+        patches
+    }
+
+    pub fn block_count(&self) -> usize {
+        self.volumes.len()
+    }
+
+    #[inline(always)]
+    pub fn corners(&self, block: usize) -> &[PatchCorner] {
+        &self.corners[self.starts[block] as usize..self.starts[block + 1] as usize]
+    }
+
+    /// Nodes of every patch with their gradients, and its volume.
+    pub fn iter(&self) -> impl Iterator<Item = (Vec<(u32, Vec3)>, f64)> + '_ {
+        (0..self.count).map(|p| {
+            let (block, lane) = (p / LANES, p % LANES);
+            let corners = self.corners(block).iter().map(|c| {
+                (c.nodes[lane], Vec3::from_fn(|k, _| c.gradient[k].0[lane]))
+            });
+            (corners.filter(|(_, g)| *g != Vec3::zeros()).collect(), self.volumes[block].0[lane])
+        })
+    }
+
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.corners[..]) + size_of_val(&self.volumes[..])
+    }
+
+    /// Deformation gradients of a block.
+    #[inline(always)]
+    pub fn deformation_gradient(&self, block: usize, x: &[Vec3]) -> LaneMat3 {
+        let corners = self.corners(block);
+        // Against one of the nodes: far from the origin, sums of gradients that cancel would not.
+        let first = corners[0].nodes.map(|n| &x[n as usize]);
+        let mut F = LaneMat3::default();
+        for corner in &corners[1..] {
+            let mut p = [Lane::default(); 3];
+            for i in 0..LANES {
+                let at = &x[corner.nodes[i] as usize];
+                for r in 0..3 {
+                    p[r].0[i] = at[r] - first[i][r];
+                }
+            }
+            for c in 0..3 {
+                for r in 0..3 {
+                    F.0[3 * c + r] = p[r].mul_add(corner.gradient[c], F.0[3 * c + r]);
+                }
+            }
+        }
+        F
+    }
+
+    /// Adds the forces of a block of this stress.
+    #[inline(always)]
+    pub fn scatter_forces(&self, block: usize, stress: &LaneMat3, force: &mut [Vec3]) {
+        let P = stress.scaled(self.volumes[block]);
+        let corners = self.corners(block);
+        let mut rest = [Lane::default(); 3];
+        for corner in &corners[1..] {
+            for r in 0..3 {
+                let f = crate::math::lanes::dot3([P.at(r, 0), P.at(r, 1), P.at(r, 2)], corner.gradient);
+                rest[r] += f;
+                for i in 0..LANES {
+                    force[corner.nodes[i] as usize][r] -= f.0[i];
+                }
+            }
+        }
+        for r in 0..3 {
+            for i in 0..LANES {
+                force[corners[0].nodes[i] as usize][r] += rest[r].0[i];
+            }
+        }
+    }
+}
+
+/// Deformation gradient of one patch.
+pub(crate) fn deformation_gradient(corners: &[(u32, Vec3)], x: &[Vec3]) -> Mat3 {
+    corners.iter().fold(Mat3::zeros(), |F, (n, g)| F + x[*n as usize] * g.transpose())
+}
