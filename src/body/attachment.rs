@@ -49,6 +49,15 @@ pub(crate) enum Anchors {
     Deformable(DeformableBodyHandle, Vec<u32>),
 }
 
+/// A node that an attachment leads along a way that nothing can change: for the step it is as good as pinned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Hold {
+    pub node: u32,
+    /// Where it is at the end of the step \[m\].
+    pub target: Vec3,
+    pub attachment: DeformableAttachmentHandle,
+}
+
 impl DeformableAttachment {
     /// Whether it is of this body, or to it.
     pub(super) fn ties(&self, body: DeformableBodyHandle) -> bool {
@@ -132,6 +141,11 @@ impl DeformableAttachment {
     /// The bodies that it ties, if something was changed since this was asked last.
     pub(crate) fn take_changed(&mut self) -> [Option<DeformableBodyHandle>; 2] {
         if std::mem::take(&mut self.changed) { self.bodies() } else { [None; 2] }
+    }
+
+    /// Whether it holds its nodes exactly where they are tied.
+    pub(crate) fn is_hard(&self) -> bool {
+        !self.broken && self.compliance == 0.0 && self.length == 0.0
     }
 
     /// The rigid body that it ties to.

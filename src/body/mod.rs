@@ -19,7 +19,7 @@ mod state;
 pub(crate) mod tangent;
 mod thin;
 
-pub(crate) use attachment::Anchors;
+pub(crate) use attachment::{Anchors, Hold};
 pub use attachment::{AttachTo, DeformableAttachment, DeformableAttachmentHandle};
 pub use body::{BodyError, DeformableBody, Pin};
 pub use builder::DeformableBodyBuilder;

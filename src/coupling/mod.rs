@@ -16,4 +16,4 @@ pub(crate) use obstacles::{RapierScene, combined, combined_between};
 pub use parts::PhysicsParts;
 pub(crate) use parts::{RapierSets, packed};
 pub(crate) use reactions::Reactions;
-pub(crate) use ties::{attachment_of, tie_rows};
+pub(crate) use ties::{attachment_of, held_nodes, tie_rows};

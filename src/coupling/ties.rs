@@ -3,7 +3,10 @@
 
 use super::obstacles::RapierScene;
 use super::parts::RapierSets;
-use crate::body::{Anchors, ContactKey, DeformableBodyHandle, DeformableBodySet, FIRST_LINK_SLOT};
+use crate::body::{
+    Anchors, ContactKey, DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet, FIRST_LINK_SLOT,
+    Hold,
+};
 use crate::contact::{Law, Row, Side};
 use crate::math::{Pose64, Vec3};
 use rapier3d::math::Vector;
@@ -19,8 +22,39 @@ pub(crate) fn attachment_of(key: &ContactKey) -> Option<u64> {
     (key.slot == TIE_SLOT).then_some(key.obstacle)
 }
 
-/// Adds the rows of all attachments; `index_of` tells the place of a body in the step's list, of bodies
-/// that are stepped.
+/// Appends the nodes that hard attachments to the world, and to bodies that do not yield, hold, each with the body
+/// that it is of.
+pub(crate) fn held_nodes(
+    deformables: &DeformableBodySet,
+    scene: &mut RapierScene,
+    sets: RapierSets<'_>,
+    gravity: Vector,
+    dt: f64,
+    held: &mut Vec<(DeformableBodyHandle, Hold)>,
+) {
+    for (handle, attachment) in deformables.attachments().filter(|(_, a)| a.is_hard()) {
+        let mut hold = |node: u32, target: Vec3| {
+            held.push((attachment.body(), Hold { node, target, attachment: handle }));
+        };
+        match &attachment.anchors {
+            Anchors::World(points) => {
+                attachment.nodes.iter().zip(points).for_each(|(node, point)| hold(*node, *point));
+            }
+            Anchors::Rigid(rigid, points) => {
+                let partner = scene.body_partner(sets, *rigid, gravity, dt);
+                let Some(end) = partner.and_then(|id| scene.partners.get(id).prescribed_end()) else {
+                    continue;
+                };
+                let points = points.iter().map(|point| end.transform(point));
+                attachment.nodes.iter().zip(points).for_each(|(node, point)| hold(*node, point));
+            }
+            Anchors::Deformable(..) => {}
+        }
+    }
+}
+
+/// Adds the rows of all attachments, but of nodes that are held (`is_held`, by an attachment) anyway; `index_of`
+/// tells the place of a body in the step's list, of bodies that are stepped.
 pub(crate) fn tie_rows(
     deformables: &DeformableBodySet,
     scene: &mut RapierScene,
@@ -28,6 +62,7 @@ pub(crate) fn tie_rows(
     gravity: Vector,
     dt: f64,
     index_of: impl Fn(DeformableBodyHandle) -> Option<usize>,
+    is_held: impl Fn(usize, u32, DeformableAttachmentHandle) -> bool,
     rows: &mut Vec<Row>,
 ) {
     for (handle, attachment) in deformables.attachments().filter(|(_, a)| !a.is_broken()) {
@@ -41,6 +76,9 @@ pub(crate) fn tie_rows(
             Anchors::Deformable(..) => None,
         };
         for (k, &node) in attachment.nodes.iter().enumerate() {
+            if is_held(own, node, handle) {
+                continue;
+            }
             let x = body.state.x[node as usize];
             let (other, point) = match &attachment.anchors {
                 Anchors::World(points) => (partner_side(partner, points[k]), points[k]),

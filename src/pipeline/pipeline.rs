@@ -18,7 +18,7 @@ use crate::body::{
     Integrator, is_number,
 };
 use crate::contact::{Candidates, Row, Side};
-use crate::coupling::{Around, Closure, PhysicsParts, RapierScene, RapierSets, Reactions, tie_rows};
+use crate::coupling::{Around, Closure, PhysicsParts, RapierScene, RapierSets, Reactions, held_nodes, tie_rows};
 use crate::error::DeformableBodyError;
 use crate::math::from_real;
 use crate::solver::{FactorCache, FactorKey, ROUNDING, Reaction, SECOND_ORDER};
@@ -44,6 +44,8 @@ pub struct DeformablePipeline {
     sleeping: Sleeping,
     slept: Vec<DeformableBodyHandle>,
     encounters: Encounters,
+    /// Nodes that attachments hold.
+    held: Vec<(DeformableBodyHandle, Hold)>,
     /// Rows of attachments and of contacts between deformables.
     ties: Vec<Row>,
     reaction_list: Vec<Reaction>,
@@ -87,7 +89,7 @@ impl DeformablePipeline {
         let mut clock = Clock::start();
         self.read_obstacles(sets, gravity, h);
         self.wake(deformables, sets, gravity, h);
-        self.predict(deformables, gravity, h);
+        self.predict(deformables, sets, gravity, h);
         self.detect(deformables, sets, 0);
         self.meet(deformables, sets, gravity, h);
         // What touches a sleeping body goes on to do so.
@@ -172,7 +174,13 @@ impl DeformablePipeline {
         self.sleeping.wake(deformables, sets, scene, candidates, &from_real(gravity), h);
     }
 
-    fn predict(&mut self, deformables: &mut DeformableBodySet, gravity: Vector, h: f64) {
+    fn predict(
+        &mut self,
+        deformables: &mut DeformableBodySet,
+        sets: RapierSets<'_>,
+        gravity: Vector,
+        h: f64,
+    ) {
         for (handle, body) in deformables.iter_mut() {
             if !body.is_enabled() {
                 continue;
@@ -190,8 +198,21 @@ impl DeformablePipeline {
             }
             self.take_up(handle);
         }
+        self.held.clear();
+        held_nodes(deformables, &mut self.scene, sets, gravity, h, &mut self.held);
+        self.hold(0);
         let (set, gravity) = (&*deformables, from_real(gravity));
         for_each(&mut self.works, |work| work.predict(&set[work.handle], h, &gravity));
+    }
+
+    /// Tells the bodies from place `first` on what attachments hold of them.
+    fn hold(&mut self, first: usize) {
+        let held = &self.held;
+        for work in &mut self.works[first..] {
+            let own = held.iter().filter(|(body, _)| *body == work.handle);
+            work.holds.clear();
+            work.holds.extend(own.map(|(_, hold)| *hold));
+        }
     }
 
     fn take_up(&mut self, handle: DeformableBodyHandle) {
@@ -228,6 +249,7 @@ impl DeformablePipeline {
                     self.counters.sleeping -= 1;
                 }
             }
+            self.hold(first);
             let (set, gravity) = (&*deformables, from_real(gravity));
             for_each(&mut self.works[first..], |work| work.predict(&set[work.handle], h, &gravity));
             self.detect(deformables, sets, first);
@@ -293,7 +315,8 @@ impl DeformablePipeline {
         self.works.iter_mut().for_each(|work| work.tied.clear());
         let works = &self.works;
         let index_of = |handle: DeformableBodyHandle| works.iter().position(|w| w.handle == handle);
-        tie_rows(deformables, &mut self.scene, sets, gravity, h, index_of, &mut self.ties);
+        let is_held = |place: usize, node, by| works[place].is_held(node, by);
+        tie_rows(deformables, &mut self.scene, sets, gravity, h, index_of, is_held, &mut self.ties);
         for side in self.ties.iter().flat_map(|row| &row.sides) {
             if let Side::Soft { body, .. } = side {
                 self.works[*body].tied.extend(side.soft_nodes().map(|(node, _)| node as u32));
@@ -343,6 +366,12 @@ impl DeformablePipeline {
                 let Some(body) = deformables.get_mut(handle) else { continue };
                 if finite {
                     store(body, work, local, h, &mut self.counters);
+                    let problem = &work.island.bodies[local];
+                    for hold in &problem.holds {
+                        if let Some(attachment) = deformables.attachment_mut(hold.attachment) {
+                            attachment.force += problem.pin_force(hold.node);
+                        }
+                    }
                 } else if !work.island.bodies[local].current.x.iter().all(is_number) {
                     quarantine(body, &mut self.counters);
                 }
@@ -417,8 +446,8 @@ fn store(
     let in_flight = work.island.contacts.active() == 0;
     problem.end_velocities(in_flight, &mut body.state.v);
     body.state.x.clone_from(&problem.current.x);
-    for (k, pin) in body.pins.iter_mut().enumerate() {
-        pin.force = problem.pin_force(k);
+    for pin in &mut body.pins {
+        pin.force = problem.pin_force(pin.node);
     }
     work.memory_of(local, h, &mut body.state.contacts);
     body.state.closure.clear();

@@ -1,6 +1,9 @@
 //! What the pipeline keeps per body from step to step: memory only, nothing that results depend on.
 
-use crate::body::{ContactMemory, DeformableBody, DeformableBodyHandle, DeformableState, is_number};
+use crate::body::{
+    ContactMemory, DeformableAttachmentHandle, DeformableBody, DeformableBodyHandle, DeformableState, Hold,
+    is_number,
+};
 use crate::contact::{Candidates, Detector, Pair, Row, STATIC_MARGIN, Side, SoftSurface, SurfaceTree};
 use crate::coupling::{RapierScene, RapierSets, combined, packed};
 use crate::math::Vec3;
@@ -23,6 +26,8 @@ pub(super) struct BodyWork {
     distances: Vec<(f32, u32)>,
     /// Nodes that attachments and contacts with other deformables act on.
     pub tied: Vec<u32>,
+    /// Nodes that attachments hold.
+    pub holds: Vec<Hold>,
     /// Box around all that the body may touch over the step.
     pub extent: Aabb,
     /// Other deformables are near, or the body may touch itself.
@@ -46,6 +51,7 @@ impl BodyWork {
             ahead: Vec::new(),
             distances: Vec::new(),
             tied: Vec::new(),
+            holds: Vec::new(),
             extent: Aabb::new_invalid(),
             in_company: false,
             tree: SurfaceTree::default(),
@@ -93,11 +99,18 @@ impl BodyWork {
         side.soft_nodes().all(|(node, _)| pins.is_some_and(|p| p.binary_search(&(node as u32)).is_ok()))
     }
 
+    /// Whether an attachment holds a node for the step.
+    pub fn is_held(&self, node: u32, by: DeformableAttachmentHandle) -> bool {
+        let holds = self.problem.as_ref().map_or(&[][..], |problem| &problem.holds);
+        let place = holds.binary_search_by_key(&node, |hold| hold.node);
+        place.is_ok_and(|place| holds[place].attachment == by)
+    }
+
     /// Takes the body in: inertial target, masses, damping.
     pub fn predict(&mut self, body: &DeformableBody, h: f64, gravity: &Vec3) {
         match &mut self.problem {
-            Some(problem) if problem.model.id == body.model.id => problem.begin(body, h, gravity),
-            problem => *problem = Some(BodyProblem::new(body, h, gravity)),
+            Some(problem) if problem.model.id == body.model.id => problem.begin(body, h, gravity, &self.holds),
+            problem => *problem = Some(BodyProblem::new(body, h, gravity, &self.holds)),
         }
     }
 

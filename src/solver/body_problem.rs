@@ -70,6 +70,8 @@ pub(crate) struct BodyProblem {
     force: Vec<Vec3>,
     /// The body's frame at the start of the iteration.
     frame: Mat3,
+    /// Nodes that attachments hold, ascending; pinned for the step.
+    pub holds: Vec<Hold>,
     /// Where the pinned nodes would go by inertia and external forces.
     pinned_inertia: Vec<Vec3>,
 }
@@ -89,8 +91,8 @@ pub(crate) struct Iterate {
 }
 
 impl BodyProblem {
-    /// Takes in a body at the start of a step of `h` \[s\] under `gravity` [m/s²].
-    pub fn new(body: &DeformableBody, h: f64, gravity: &Vec3) -> Self {
+    /// Takes in a body at the start of a step of `h` \[s\] under `gravity` [m/s²], with what attachments hold of it.
+    pub fn new(body: &DeformableBody, h: f64, gravity: &Vec3, holds: &[Hold]) -> Self {
         let n = body.state.x.len();
         let mut problem = Self {
             key: FactorKey::new(body, h),
@@ -119,14 +121,21 @@ impl BodyProblem {
             step: vec![Vec3::zeros(); n],
             force: Vec::new(),
             frame: Mat3::identity(),
+            holds: Vec::new(),
             pinned_inertia: Vec::new(),
         };
-        problem.begin(body, h, gravity);
+        problem.begin(body, h, gravity, holds);
         problem
     }
 
     /// As [`BodyProblem::new`], in the memory of an earlier step.
-    pub fn begin(&mut self, body: &DeformableBody, h: f64, gravity: &Vec3) {
+    pub fn begin(&mut self, body: &DeformableBody, h: f64, gravity: &Vec3, holds: &[Hold]) {
+        // What its user has pinned stays there.
+        let is_free = |hold: &&Hold| body.pins.binary_search_by_key(&hold.node, |p| p.node).is_err();
+        self.holds.clear();
+        self.holds.extend(holds.iter().filter(is_free));
+        self.holds.sort_unstable_by_key(|hold| (hold.node, hold.attachment));
+        self.holds.dedup_by_key(|hold| hold.node);
         let history = &body.state.history;
         let continues = history.h == h && history.x.len() == body.state.x.len();
         self.is_second_order = continues && body.settings().integrator == Integrator::Bdf2;
@@ -146,6 +155,8 @@ impl BodyProblem {
         let n = body.state.x.len();
         let h = if self.is_second_order { SECOND_ORDER * self.dt } else { self.dt };
         self.key.update(body, h);
+        self.key.pins.extend(self.holds.iter().map(|hold| hold.node));
+        self.key.pins.sort_unstable();
         self.settings = *body.settings();
         self.material = body.material;
         self.activation = body.activation;
@@ -173,9 +184,10 @@ impl BodyProblem {
         };
         self.target.extend((0..n).map(to_target));
         self.pinned_inertia.clear();
-        for pin in &body.pins {
-            self.pinned_inertia.push(self.target[pin.node as usize]);
-            self.target[pin.node as usize] = pin.target;
+        self.pinned_inertia.extend(self.key.pins.iter().map(|&p| self.target[p as usize]));
+        let pins = body.pins.iter().map(|pin| (pin.node, pin.target));
+        for (node, target) in pins.chain(self.holds.iter().map(|hold| (hold.node, hold.target))) {
+            self.target[node as usize] = target;
         }
         self.contact_force.clear();
         self.contact_force.resize(n, Vec3::zeros());
@@ -395,9 +407,10 @@ impl BodyProblem {
         self.key.pins.iter().for_each(|&p| out[p as usize] = Vec3::zeros());
     }
 
-    /// Force \[N\] with which the `k`-th pin holds its node.
-    pub fn pin_force(&self, k: usize) -> Vec3 {
-        let node = self.key.pins[k] as usize;
+    /// Force \[N\] with which a pinned node is held.
+    pub fn pin_force(&self, node: u32) -> Vec3 {
+        let Ok(k) = self.key.pins.binary_search(&node) else { return Vec3::zeros() };
+        let node = node as usize;
         let inertia =
             (self.pinned_inertia[k] - self.current.x[node]) * (self.masses[node] / (self.h * self.h));
         -(inertia + self.current.r[node] + self.contact_force[node])

@@ -86,6 +86,14 @@ impl Partner {
         }
     }
 
+    /// Where a body that does not yield is at the end of the step.
+    pub fn prescribed_end(&self) -> Option<Pose64> {
+        match self {
+            Self::Prescribed { end, .. } => Some(*end),
+            Self::Rigid { .. } | Self::Link { .. } => None,
+        }
+    }
+
     fn yields(&self) -> bool {
         match self {
             Self::Prescribed { .. } => false,

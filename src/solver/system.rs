@@ -161,6 +161,7 @@ const CACHED_BYTES: usize = 4 << 20;
 /// Whether the numbers of a body's factor are rounded to single precision.
 pub(crate) fn in_single_precision(
     body: &DeformableBody,
+    is_pinned: bool,
     h: f64,
     symbolic: &Symbolic,
     values: &[f64],
@@ -169,7 +170,7 @@ pub(crate) fn in_single_precision(
         FactorPrecision::Double => false,
         FactorPrecision::Single => true,
         FactorPrecision::Automatic => {
-            !body.pins.is_empty()
+            is_pinned
                 && symbolic.factor_len() * size_of::<f64>() > CACHED_BYTES
                 && condition(body, h, symbolic, values) < SINGLE_CONDITION
         }

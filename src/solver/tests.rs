@@ -42,7 +42,7 @@ fn prepared(system: SystemMatrix, frames: Frames, pinned: bool) -> (FactorCache,
     let mut cache = FactorCache::default();
     let all = 0..body.model.surface.nodes.len() as u32;
     let made = cache.prepare(&FactorKey::new(&body, H), &body, H, all).unwrap();
-    let mut problem = BodyProblem::new(&body, H, &Vec3::new(0.0, -9.81, 0.0));
+    let mut problem = BodyProblem::new(&body, H, &Vec3::new(0.0, -9.81, 0.0), &[]);
     problem.factor = made.id;
     problem.choose_start(cache.get(problem.factor));
     (cache, problem)
