@@ -58,8 +58,7 @@ impl Patches {
         let mut patches = Self { starts: vec![0], count: all.len(), ..Self::default() };
         for block in all.chunks(LANES) {
             let count = block.iter().map(|p| p.gradients.len()).max().unwrap_or(0);
-            let mut corners =
-                vec![PatchCorner { nodes: [0; LANES], gradient: [Lane::default(); 3] }; count];
+            let mut corners = vec![PatchCorner { nodes: [0; LANES], gradient: [Lane::default(); 3] }; count];
             let mut volumes = Lane::default();
             for i in 0..LANES {
                 // The last block is filled up with copies of its last patch, without volume.
@@ -96,9 +95,10 @@ impl Patches {
     pub fn iter(&self) -> impl Iterator<Item = (Vec<(u32, Vec3)>, f64)> + '_ {
         (0..self.count).map(|p| {
             let (block, lane) = (p / LANES, p % LANES);
-            let corners = self.corners(block).iter().map(|c| {
-                (c.nodes[lane], Vec3::from_fn(|k, _| c.gradient[k].0[lane]))
-            });
+            let corners = self
+                .corners(block)
+                .iter()
+                .map(|c| (c.nodes[lane], Vec3::from_fn(|k, _| c.gradient[k].0[lane])));
             (corners.filter(|(_, g)| *g != Vec3::zeros()).collect(), self.volumes[block].0[lane])
         })
     }

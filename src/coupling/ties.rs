@@ -4,8 +4,8 @@
 use super::obstacles::RapierScene;
 use super::parts::RapierSets;
 use crate::body::{
-    Anchors, ContactKey, DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet, FIRST_LINK_SLOT,
-    Hold,
+    Anchors, ContactKey, DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet,
+    FIRST_LINK_SLOT, Hold,
 };
 use crate::contact::{Law, Row, Side};
 use crate::math::{Pose64, Vec3};

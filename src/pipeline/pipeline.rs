@@ -14,14 +14,16 @@ use super::sleeping::Sleeping;
 use super::threads::for_each;
 use super::work::{BodyWork, IslandWork};
 use crate::body::{
-    DeformableAttachment, DeformableBody, DeformableBodyHandle, DeformableBodySet, DeformableState,
+    DeformableAttachment, DeformableBody, DeformableBodyHandle, DeformableBodySet, DeformableState, Hold,
     Integrator, is_number,
 };
 use crate::contact::{Candidates, Row, Side};
-use crate::coupling::{Around, Closure, PhysicsParts, RapierScene, RapierSets, Reactions, held_nodes, tie_rows};
+use crate::coupling::{
+    Around, Closure, PhysicsParts, RapierScene, RapierSets, Reactions, held_nodes, tie_rows,
+};
 use crate::error::DeformableBodyError;
 use crate::math::from_real;
-use crate::solver::{FactorCache, FactorKey, ROUNDING, Reaction, SECOND_ORDER};
+use crate::solver::{BodyProblem, FactorCache, FactorKey, ROUNDING, Reaction, SECOND_ORDER};
 use rapier3d::math::Vector;
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
@@ -366,12 +368,7 @@ impl DeformablePipeline {
                 let Some(body) = deformables.get_mut(handle) else { continue };
                 if finite {
                     store(body, work, local, h, &mut self.counters);
-                    let problem = &work.island.bodies[local];
-                    for hold in &problem.holds {
-                        if let Some(attachment) = deformables.attachment_mut(hold.attachment) {
-                            attachment.force += problem.pin_force(hold.node);
-                        }
-                    }
+                    give_forces(&work.island.bodies[local], deformables);
                 } else if !work.island.bodies[local].current.x.iter().all(is_number) {
                     quarantine(body, &mut self.counters);
                 }
@@ -446,8 +443,9 @@ fn store(
     let in_flight = work.island.contacts.active() == 0;
     problem.end_velocities(in_flight, &mut body.state.v);
     body.state.x.clone_from(&problem.current.x);
+    let share = problem.pin_share();
     for pin in &mut body.pins {
-        pin.force = problem.pin_force(pin.node);
+        pin.force = problem.pin_force(pin.node, &share);
     }
     work.memory_of(local, h, &mut body.state.contacts);
     body.state.closure.clear();
@@ -460,6 +458,19 @@ fn store(
     body.report.guard_retries = problem.guard_retries;
     counters.guard_retries += problem.guard_retries;
     counters.not_converged += usize::from(!body.last_converged());
+}
+
+/// Gives attachments the forces with which they hold nodes of a body.
+fn give_forces(problem: &BodyProblem, deformables: &mut DeformableBodySet) {
+    if problem.holds.is_empty() {
+        return;
+    }
+    let share = problem.pin_share();
+    for hold in &problem.holds {
+        if let Some(attachment) = deformables.attachment_mut(hold.attachment) {
+            attachment.force += problem.pin_force(hold.node, &share);
+        }
+    }
 }
 
 struct Clock(Instant);

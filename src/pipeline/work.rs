@@ -109,7 +109,9 @@ impl BodyWork {
     /// Takes the body in: inertial target, masses, damping.
     pub fn predict(&mut self, body: &DeformableBody, h: f64, gravity: &Vec3) {
         match &mut self.problem {
-            Some(problem) if problem.model.id == body.model.id => problem.begin(body, h, gravity, &self.holds),
+            Some(problem) if problem.model.id == body.model.id => {
+                problem.begin(body, h, gravity, &self.holds)
+            }
             problem => *problem = Some(BodyProblem::new(body, h, gravity, &self.holds)),
         }
     }

@@ -10,7 +10,7 @@ use super::metric::Metric;
 use super::system::FactorKey;
 use crate::body::elastic::{self, Elements, StiffnessDamping};
 use crate::body::{
-    DeformableBody, DeformableModel, Frames, Integrator, Solver, SolverSettings, SystemMatrix,
+    DeformableBody, DeformableModel, Frames, Hold, Integrator, Solver, SolverSettings, SystemMatrix,
 };
 use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3, rotation_from_vector, skew};
@@ -407,13 +407,26 @@ impl BodyProblem {
         self.key.pins.iter().for_each(|&p| out[p as usize] = Vec3::zeros());
     }
 
-    /// Force \[N\] with which a pinned node is held.
-    pub fn pin_force(&self, node: u32) -> Vec3 {
+    /// What the iteration has left of the forces on free nodes \[N\], per pinned node: the pins carry it too, so
+    /// that with gravity and contacts they add up to what moves the body.
+    pub fn pin_share(&self) -> Vec3 {
+        let mut left = Vec3::zeros();
+        let mut pins = self.key.pins.iter().peekable();
+        for (i, (r, f)) in self.current.r.iter().zip(&self.contact_force).enumerate() {
+            if pins.next_if(|&&p| p as usize == i).is_none() {
+                left += r + f;
+            }
+        }
+        left / self.key.pins.len().max(1) as f64
+    }
+
+    /// Force \[N\] with which a pinned node is held; `share` is [`BodyProblem::pin_share`].
+    pub fn pin_force(&self, node: u32, share: &Vec3) -> Vec3 {
         let Ok(k) = self.key.pins.binary_search(&node) else { return Vec3::zeros() };
         let node = node as usize;
         let inertia =
             (self.pinned_inertia[k] - self.current.x[node]) * (self.masses[node] / (self.h * self.h));
-        -(inertia + self.current.r[node] + self.contact_force[node])
+        -(inertia + self.current.r[node] + self.contact_force[node]) - share
     }
 
     pub fn evaluate_current(&mut self) {

@@ -117,7 +117,8 @@ impl FactorCache {
             let factor = match key.solver {
                 Solver::Projective => {
                     let factor = symbolic.factorize(&values, &mut self.scratch).ok()?;
-                    let is_single = system::in_single_precision(body, !key.pins.is_empty(), h, &symbolic, &values);
+                    let is_single =
+                        system::in_single_precision(body, !key.pins.is_empty(), h, &symbolic, &values);
                     if is_single { factor.rounded() } else { factor }
                 }
                 Solver::ConjugateGradients => Factor::Iterative(values),
