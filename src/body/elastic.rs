@@ -8,6 +8,7 @@
 
 use super::elements::ElementBlock;
 use super::model::DeformableModel;
+use super::patches::Patches;
 use super::thin::{self, ThinDamping};
 use crate::energy::{ElementEnergy, with_energy};
 use crate::material::{DeformableMaterial, Lame};
@@ -95,10 +96,13 @@ pub(crate) fn add_forces(
     force: &mut [Vec3],
 ) -> Elastic {
     let Elements { model, material, .. } = elements;
-    let mut elastic = with_energy!(material, energy => match model.is_smoothed() {
-        true => sum_patches(energy, model, material, damping, x, frame, limit, force),
-        false => sum_elements(energy, model, material, damping, x, frame, limit, force),
-    });
+    let mut elastic = if model.is_smoothed() {
+        add_smoothed_forces(model, material, damping, x, frame, limit, force)
+    } else {
+        with_energy!(material, material.lame(), energy => {
+            sum_elements(energy, model, material, damping, x, frame, limit, force)
+        })
+    };
     if !(model.triangles.is_empty() && model.stencils.is_empty()) {
         elastic.energy += thin::add_forces(elements, &damping.thin, damping.ratio, x, force);
     }
@@ -152,9 +156,8 @@ fn sum_elements[E: ElementEnergy](
 }
 }
 
-vectorized! {
-fn sum_patches[E: ElementEnergy](
-    energy: E,
+/// Shape over edges, volume over nodes: every energy is the sum of what μ and what λ weigh.
+fn add_smoothed_forces(
     model: &DeformableModel,
     material: &DeformableMaterial,
     damping: &StiffnessDamping,
@@ -163,8 +166,33 @@ fn sum_patches[E: ElementEnergy](
     limit: f64,
     force: &mut [Vec3],
 ) -> Elastic {
+    let Lame { mu, lambda } = material.lame();
+    let mut elastic = with_energy!(material, Lame { mu, lambda: 0.0 }, energy => {
+        sum_patches(energy, &model.patches, material, damping, x, frame, limit, force)
+    });
+    if lambda > 0.0 && elastic.energy < f64::INFINITY {
+        let bare = DeformableMaterial { strain_limits: None, ..*material };
+        let (undamped, rest) = (StiffnessDamping::default(), limit - elastic.energy);
+        let volume = with_energy!(bare, Lame { mu: 0.0, lambda }, energy => {
+            sum_patches(energy, &model.volume_patches, material, &undamped, x, frame, rest, force)
+        });
+        elastic.energy += volume.energy;
+    }
+    elastic
+}
+
+vectorized! {
+fn sum_patches[E: ElementEnergy](
+    energy: E,
+    patches: &Patches,
+    material: &DeformableMaterial,
+    damping: &StiffnessDamping,
+    x: &[Vec3],
+    frame: &Mat3,
+    limit: f64,
+    force: &mut [Vec3],
+) -> Elastic {
     let lame = material.lame();
-    let patches = &model.patches;
     let mut total = Lane::default();
     let mut least_trace = Lane::splat(3.0);
     for block in 0..patches.block_count() {
@@ -381,6 +409,34 @@ mod tests {
             let work: f64 = forces(&material, &damping, &x).1.iter().zip(&direction).map(|(f, d)| f.dot(d)).sum();
             // Central difference: eps² × third derivative plus 1e-16·E/eps with E ~ 10 J.
             prop_assert!((slope + work).abs() < 1e-5 * (1.0 + work.abs()), "{slope} {work}");
+        }
+
+        #[test]
+        fn smoothed_forces_are_minus_the_gradient_too(
+            seed in any::<u64>(), beta in prop_oneof![Just(0.0), Just(0.02)], kind in 0usize..4,
+        ) {
+            let material = DeformableMaterial::new(1e3, 0.4).elasticity(Elasticity::ALL[kind]);
+            let model = model().smoothed();
+            let elements = Elements { model: &model, material: &material, activation: 1.0 };
+            let mut damping = StiffnessDamping::default();
+            damping.begin(&model, beta, 0.01, &shaken(seed ^ 1, 0.05));
+            let at = |x: &[Vec3]| {
+                let mut f = vec![Vec3::zeros(); x.len()];
+                let elastic = add_forces(&elements, &damping, x, &Mat3::identity(), f64::INFINITY, &mut f);
+                (elastic.energy, f)
+            };
+            let x = shaken(seed, 0.05);
+            let direction: Vec<Vec3> = shaken(seed ^ 7, 1.0).iter().zip(&model.rest).map(|(a, b)| a - b).collect();
+            let moved = |t: f64| -> Vec<Vec3> { x.iter().zip(&direction).map(|(p, d)| p + d * t).collect() };
+            let slope = (at(&moved(1e-6)).0 - at(&moved(-1e-6)).0) / 2e-6;
+            let forces = at(&x).1;
+            let work: f64 = forces.iter().zip(&direction).map(|(f, d)| f.dot(d)).sum();
+            // As without smoothing.
+            prop_assert!((slope + work).abs() < 1e-5 * (1.0 + work.abs()), "{slope} {work}");
+            let sum = forces.iter().fold(Vec3::zeros(), |a, b| a + b);
+            let moment = forces.iter().zip(&x).fold(Vec3::zeros(), |a, (f, p)| a + p.cross(f));
+            let scale: f64 = forces.iter().map(|f| f.norm()).sum();
+            prop_assert!(sum.norm() < 1e-12 * scale && moment.norm() < 1e-10 * scale);
         }
 
         #[test]

@@ -21,8 +21,10 @@ pub struct DeformableModel {
     pub(crate) tetrahedra: Vec<[u32; 4]>,
     /// The tetrahedra again, four at a time, as the element loops want them.
     pub(crate) blocks: Vec<ElementBlock>,
-    /// In the place of `blocks`, the patches of smoothed tetrahedra.
+    /// In the place of `blocks`, the patches of smoothed tetrahedra: around edges for the shape, around nodes for
+    /// the volume.
     pub(crate) patches: Patches,
+    pub(crate) volume_patches: Patches,
     /// Triangles of sheets.
     pub(crate) triangles: Vec<TriangleElement>,
     /// What keeps lengths: springs, rods, hinges of sheets, muscle fibres.
@@ -79,10 +81,10 @@ impl DeformableModel {
         self
     }
 
-    /// The same with its tetrahedra smoothed over their edges [Liu et al. 2009; He et al. 2013]: much less
-    /// stiff in bending than linear tetrahedra are, whose stiffness falls to the true one only with the mesh. An
-    /// element more has to be computed per edge, and the factor is about twice as large: worth it wherever
-    /// the mesh is coarse. What it gains is in the README.
+    /// The same with its tetrahedra smoothed over their edges and nodes [Liu et al. 2009; He et al. 2013]: they do not
+    /// lock, in bending and near incompressibility, as linear tetrahedra do, whose stiffness falls to the
+    /// true one only with the mesh. Elements cost three times as much, and the factor is twice as large:
+    /// worth it wherever the mesh is coarse. What it gains is in the README.
     pub fn smoothed(mut self) -> Self {
         if !self.is_solid() {
             return self;
@@ -92,7 +94,8 @@ impl DeformableModel {
             let block = &self.blocks[e / LANES];
             (*tet, block.shape_gradients(e % LANES), block.volumes.0[e % LANES])
         });
-        self.patches = Patches::new(tetrahedra);
+        self.patches = Patches::around_edges(tetrahedra.clone());
+        self.volume_patches = Patches::around_nodes(tetrahedra);
         let patches: Vec<Vec<u32>> =
             self.patches.iter().map(|(corners, _)| corners.iter().map(|c| c.0).collect()).collect();
         let stencils = self.stencils.iter().map(|s| &s.nodes[..]);
@@ -141,6 +144,7 @@ impl DeformableModel {
             size: (high - low).norm(),
             rest,
             patches: Patches::default(),
+            volume_patches: Patches::default(),
             triangles: thin.triangles,
             stencils: thin.stencils,
             half_thickness: thin.half_thickness,
@@ -223,6 +227,7 @@ impl DeformableModel {
             + 2 * size_of_val(&self.node_volumes[..])
             + self.adjacency.iter().chain(&self.coupling).map(|a| 24 + 4 * a.len()).sum::<usize>()
             + self.patches.bytes()
+            + self.volume_patches.bytes()
             + size_of_val(&self.surface.triangles[..]) * 2
             + size_of_val(&self.surface.edges[..])
             + 12 * self.rest.len()

@@ -1,8 +1,9 @@
-//! Tetrahedra smoothed over their edges [Liu et al. 2009; He et al. 2013]: around every edge one deformation
-//! gradient, the mean of those of the tetrahedra that share it, and the energy of that. Linear tetrahedra by
-//! themselves are too stiff, in bending most of all; their means are not.
+//! Tetrahedra smoothed over their edges and nodes [Liu et al. 2009; He et al. 2013]: around every edge one
+//! deformation gradient, the mean of those of the tetrahedra that share it, and the energy of shape of that; around
+//! every node likewise, and the energy of volume. Linear tetrahedra by themselves are too stiff, in
+//! bending and near incompressibility most of all; their means are not.
 //!
-//! An edge's patch is an element like any other, of all nodes of its tetrahedra, with the means of their shape
+//! A patch is an element like any other, of all nodes of its tetrahedra, with the means of their shape
 //! gradients: `F = Σ x_a g_aᵀ`, `f_a = −V P(F) g_a`.
 
 use crate::math::lanes::{LANES, Lane, LaneMat3};
@@ -15,7 +16,7 @@ pub(crate) struct Patches {
     /// First corner of each block, and the number of corners last.
     starts: Vec<u32>,
     corners: Vec<PatchCorner>,
-    /// A sixth of the volumes of the tetrahedra around each edge \[m³\]; zero in lanes that fill up.
+    /// Its share of the volumes of the tetrahedra around each \[m³\]; zero in lanes that fill up.
     pub volumes: Vec<Lane>,
     /// Number of patches.
     pub count: usize,
@@ -29,6 +30,9 @@ pub(crate) struct PatchCorner {
     gradient: [Lane; 3],
 }
 
+/// Nodes, gradients of their shape functions, and volume.
+type Tetrahedron = ([u32; 4], [Vec3; 4], f64);
+
 /// One patch while it is being put together: gradients by nodes, times the volumes that they are of.
 #[derive(Clone, Default)]
 struct Patch {
@@ -37,22 +41,36 @@ struct Patch {
 }
 
 impl Patches {
-    /// Of tetrahedra with the gradients of their shape functions and their volumes.
-    pub fn new(tetrahedra: impl Iterator<Item = ([u32; 4], [Vec3; 4], f64)>) -> Self {
-        let mut by_edge: BTreeMap<[u32; 2], Patch> = BTreeMap::new();
+    /// Around edges, of tetrahedra with the gradients of their shape functions and their volumes.
+    pub fn around_edges(tetrahedra: impl Iterator<Item = Tetrahedron>) -> Self {
+        let edges = |n: &[u32; 4]| {
+            [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]].map(|[i, j]| [n[i].min(n[j]), n[i].max(n[j])])
+        };
+        Self::new(tetrahedra, edges)
+    }
+
+    /// Around nodes.
+    pub fn around_nodes(tetrahedra: impl Iterator<Item = Tetrahedron>) -> Self {
+        Self::new(tetrahedra, |n| n.map(|n| [n, n]))
+    }
+
+    /// Around whatever is named by two nodes; each tetrahedron is shared by N such.
+    fn new<const N: usize>(
+        tetrahedra: impl Iterator<Item = Tetrahedron>,
+        names: impl Fn(&[u32; 4]) -> [[u32; 2]; N],
+    ) -> Self {
+        let mut by_name: BTreeMap<[u32; 2], Patch> = BTreeMap::new();
         for (nodes, gradients, volume) in tetrahedra {
-            for i in 0..4 {
-                for j in 0..i {
-                    let edge = [nodes[i].min(nodes[j]), nodes[i].max(nodes[j])];
-                    let patch = by_edge.entry(edge).or_default();
-                    patch.volume += volume / 6.0;
-                    for (&n, g) in nodes.iter().zip(&gradients) {
-                        *patch.gradients.entry(n).or_default() += g * (volume / 6.0);
-                    }
+            let share = volume / N as f64;
+            for name in names(&nodes) {
+                let patch = by_name.entry(name).or_default();
+                patch.volume += share;
+                for (&n, g) in nodes.iter().zip(&gradients) {
+                    *patch.gradients.entry(n).or_default() += g * share;
                 }
             }
         }
-        let mut all: Vec<Patch> = by_edge.into_values().collect();
+        let mut all: Vec<Patch> = by_name.into_values().collect();
         // Equal numbers of nodes side by side; among those, neighbours in memory.
         all.sort_by_key(|p| (p.gradients.len(), p.gradients.keys().sum::<u32>()));
         let mut patches = Self { starts: vec![0], count: all.len(), ..Self::default() };

@@ -74,11 +74,14 @@ pub(crate) trait ElementEnergy: Copy + Send + Sync {
     fn laplacian_weight(&self) -> f64;
 }
 
-/// Runs `$body` with `$energy` bound to the energy of a material.
+/// Runs `$body` with `$energy` bound to the energy of a material, with its Lamé parameters or others.
 macro_rules! with_energy {
-    ($material:expr, $energy:ident => $body:expr) => {{
+    ($material:expr, $energy:ident => $body:expr) => {
+        $crate::energy::with_energy!($material, $material.lame(), $energy => $body)
+    };
+    ($material:expr, $lame:expr, $energy:ident => $body:expr) => {{
         use $crate::energy::{Elasticity, FixedCorotated, LinearCorotated, NeoHookean, Projective};
-        let (material, lame) = ($material, $material.lame());
+        let (material, lame) = ($material, $lame);
         match material.elasticity {
             Elasticity::LinearCorotated => {
                 $crate::energy::limited_or_not!(material, LinearCorotated(lame), $energy => $body)
