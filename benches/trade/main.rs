@@ -1,5 +1,6 @@
 //! What accuracy costs: every rung of the ladder of solvers over a set of scenes, against Newton's method and
-//! rapier's own soft bodies. `cargo bench --bench trade`; `-- steps` for the table of steps and integrators alone.
+//! rapier's own soft bodies. `cargo bench --bench trade`; `-- NAME` for the scenes of
+//! that name alone, or the tables of `presets` or `steps`.
 //!
 //! Prints tables, writes `target/trade.csv` and `target/trade.svg`. One thread: a scene has one island. Error:
 //! of paths the root mean square distance from the reference's at the same step and mesh, of shapes at rest that at
@@ -29,12 +30,14 @@ struct Point {
 }
 
 fn main() {
-    let only_steps = std::env::args().any(|a| a == "steps");
+    let mut arguments = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
+    let only = arguments.next();
+    let is_wanted = |name: &str| only.as_ref().is_none_or(|part| name.contains(part));
     let mut csv = String::from(
         "scene,engine,setting,tets,dt,ms_per_step,worst_ms,error,volume_error,force_error,deepest\n",
     );
     let mut points = Vec::new();
-    for scene in if only_steps { Vec::new() } else { scenes() } {
+    for scene in scenes().into_iter().filter(|scene| is_wanted(&scene.name)) {
         let truth = scene.run(&reference(scene.tets()));
         println!("\n{} ({} elements, h = 1/{:.0})", scene.name, scene.tets(), 1.0 / scene.dt);
         for rung in rungs(&scene) {
@@ -47,11 +50,15 @@ fn main() {
             }
         }
     }
-    if !only_steps {
+    if is_wanted("presets") {
         preset_table(&mut csv, &mut points);
     }
-    step_table(&mut csv);
-    if only_steps {
+    if is_wanted("steps") {
+        mesh_table();
+        step_table(&mut csv);
+    }
+    // The plot is of everything.
+    if only.is_some() {
         return;
     }
     let target = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("target");
@@ -166,6 +173,34 @@ fn report_quietly(
         ms: record.median(),
         error,
     });
+}
+
+/// What the mesh costs: tips at rest over Timoshenko's beam, and milliseconds of a swing, with plain and smoothed
+/// tetrahedra.
+fn mesh_table() {
+    println!("\ncantilever by meshes: tip at rest over the beam's, ms per step of the swing");
+    for nu in [0.3, 0.49] {
+        for smoothed in [false, true] {
+            for cells in [[11, 3, 3], [16, 4, 4], [25, 5, 5], [32, 8, 8]] {
+                let scene =
+                    |measure| Scene { smoothed, ..Scene::cantilever("meshes", cells, 1e7, nu, measure) };
+                let rung = &presets()[1];
+                let (swing, rest) = (scene(Measure::Path).run(rung), scene(Measure::End).run(rung));
+                let tip = rest.start[1] - rest.path.last().map_or(f64::NAN, |p| p[1]);
+                let (e, g) = (1e7, f64::from(9.81f32));
+                let shear = 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu) * e / (2.0 * (1.0 + nu)) * 0.04;
+                let q = 1000.0 * g * 0.04;
+                let beam = q / (8.0 * e * 0.2f64.powi(4) / 12.0) + q / (2.0 * shear);
+                println!(
+                    "  ν {nu} {:<9} {:>6} tets  tip {:.3}  {:.3} ms",
+                    if smoothed { "smoothed" } else { "plain" },
+                    scene(Measure::End).tets(),
+                    tip / beam,
+                    swing.median()
+                );
+            }
+        }
+    }
 }
 
 /// What the step itself costs: the converged path at each step against that at 1/3840 s of the second order.

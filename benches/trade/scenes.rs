@@ -37,6 +37,8 @@ pub struct Scene {
     pub dt: f32,
     pub steps: usize,
     pub measure: Measure,
+    /// Tetrahedra smoothed over edges and nodes.
+    pub smoothed: bool,
 }
 
 /// What a run leaves.
@@ -84,6 +86,7 @@ pub fn scenes() -> Vec<Scene> {
         dt: 1.0 / 60.0,
         steps: 90,
         measure: Measure::Path,
+        smoothed: false,
     };
     let stretched = |nu: f64| Scene {
         name: format!("stretched block ν {nu}"),
@@ -92,6 +95,7 @@ pub fn scenes() -> Vec<Scene> {
         dt: 1.0 / 60.0,
         steps: 60,
         measure: Measure::Path,
+        smoothed: false,
     };
     let soft = DeformableMaterial::new(1e5, 0.3);
     let cloth = DeformableMaterial::new(1e6, 0.3).density(400.0);
@@ -151,6 +155,7 @@ impl Scene {
             dt: 1.0 / 60.0,
             steps,
             measure,
+            smoothed: false,
         }
     }
 
@@ -184,7 +189,8 @@ impl Scene {
             }
             Kind::Grasp { cells } => DeformableBodyBuilder::cuboid(Vector::splat(0.05), [*cells; 3]),
         };
-        builder.material(self.material).can_sleep(false)
+        let builder = builder.material(self.material).can_sleep(false);
+        if self.smoothed { builder.smoothed() } else { builder }
     }
 
     /// Whether a point of the rest shape is watched.
