@@ -201,13 +201,22 @@ impl BodyProblem {
     /// shape or the inertial target, whichever has the lower Ψ.
     pub fn choose_start(&mut self, factor: &SystemFactor) {
         let model = self.model.clone();
-        let (turned, _, centre) = elastic::floating_frame(&model, &self.target);
+        let is_pinned = !self.key.pins.is_empty();
+        if is_pinned {
+            // What is held does not fall: by its motion alone, so that what hangs still starts where it is.
+            let drift = self.x_start.iter().zip(&self.v_start).map(|(x, v)| x + v * self.h);
+            self.force.clear();
+            self.force.extend(drift);
+            self.key.pins.iter().for_each(|&p| self.force[p as usize] = self.target[p as usize]);
+        }
+        let goes_to = if is_pinned { &self.force } else { &self.target };
+        let (turned, _, centre) = elastic::floating_frame(&model, goes_to);
         let (before, _, centre_before) = elastic::floating_frame(&model, &self.x_start);
         let turn = turned * before.transpose();
         self.current.x.clear();
         let carried = self.x_start.iter().map(|x| centre + turn * (x - centre_before));
         self.current.x.extend(carried);
-        if !self.key.pins.is_empty() {
+        if is_pinned {
             // Shift so that the pinned nodes fit on average, then put them where they belong.
             let miss = |&p: &u32| self.target[p as usize] - self.current.x[p as usize];
             let shift = self.key.pins.iter().map(miss).sum::<Vec3>() / self.key.pins.len() as f64;
