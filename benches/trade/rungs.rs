@@ -70,6 +70,12 @@ pub fn rungs(scene: &Scene) -> Vec<Rung> {
             rungs.push(rung(family, format!("{n}"), settings));
         }
     }
+    if is_solid {
+        for n in [3, 10] {
+            let clusters = SolverSettings { system: SystemMatrix::Laplacian, clusters: 8, ..with(n) };
+            rungs.push(rung("Laplacian, 8 clusters", format!("{n}"), clusters));
+        }
+    }
     let chebyshev = SolverSettings {
         solver: Solver::Jacobi,
         system: SystemMatrix::Laplacian,

@@ -71,6 +71,9 @@ pub struct Pin {
     pub(crate) force: Vec3,
 }
 
+/// Clusters of a body at the most.
+const MAX_CLUSTERS: usize = 32;
+
 /// How the last step of a body went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct StepReport {
@@ -464,6 +467,7 @@ impl DeformableBody {
         self.wake_up();
         let mut settings = settings;
         settings.max_iterations = settings.max_iterations.max(1);
+        settings.clusters = settings.clusters.min(MAX_CLUSTERS);
         // NaN too becomes zero: iterate to the limit.
         settings.tolerance = settings.tolerance.max(0.0);
         match &mut settings.acceleration {

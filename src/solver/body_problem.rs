@@ -271,6 +271,8 @@ impl BodyProblem {
         }
         if is_free && factor.factor.is_rough() {
             self.metric.deflate(&self.masses, mobility, factor);
+        } else {
+            self.metric.set_clusters(factor, &self.current.x);
         }
     }
 

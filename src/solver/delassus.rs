@@ -214,13 +214,14 @@ impl Between<'_> {
                 Lever::Soft { body: j, count: n, nodes: nodes_b, places: places_b, directions: directions_b },
             ) if i == j => {
                 let body = &self.bodies[*i];
-                let columns = &self.factors.of(*i, body).columns;
+                let factor = self.factors.of(*i, body);
+                let columns = &factor.columns;
                 let has_one_frame = body.metric.one_frame().is_some();
                 for l in 0..*n {
                     for k in 0..*m {
                         let mut block = columns.block(places[k], places_b[l]);
                         if !has_one_frame {
-                            block = body.metric.compliance(&block, nodes[k], nodes_b[l]);
+                            block = body.metric.compliance(factor, &block, nodes[k], nodes_b[l]);
                         }
                         *sum += directions[k].tr_mul(&(block * directions_b[l]));
                     }

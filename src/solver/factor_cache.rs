@@ -3,6 +3,7 @@
 //! Everything is keyed by the exact bits it was made from, so a fresh cache gives the same bits as
 //! an old one; it only takes longer.
 
+use super::clusters::Clusters;
 use super::columns::Columns;
 use super::factor::{BATCH, Factor, FactorScratch, Symbolic};
 use super::system::{self, FactorKey};
@@ -16,6 +17,7 @@ pub(crate) struct SystemFactor {
     pub factor: Factor,
     pub system: SystemMatrix,
     pub columns: Columns,
+    pub clusters: Option<Clusters>,
     /// Different for every factor that a cache, or an island, has made.
     pub serial: u64,
 }
@@ -128,8 +130,14 @@ impl FactorCache {
             };
             work.factorizations = 1;
             let columns = Columns::new(&body.model.surface, key.system);
+            let clusters = (key.clusters > 0).then(|| {
+                let weight = system::laplacian_weight(&body.material, h);
+                let (pins, scratch) = (&key.pins, &mut self.scratch);
+                Clusters::new(&body.model, key.clusters, weight, pins, &symbolic, &factor, scratch)
+            });
+            let serial = self.made;
             let made = Entry {
-                made: SystemFactor { symbolic, factor, system: key.system, columns, serial: self.made },
+                made: SystemFactor { symbolic, factor, system: key.system, columns, clusters, serial },
                 key: key.clone(),
                 model: body.model.clone(),
                 last_used: self.step,
@@ -163,7 +171,8 @@ impl FactorCache {
 
     /// Bytes of all numeric factors.
     pub fn factor_bytes(&self) -> usize {
-        self.factors.iter().map(|f| f.made.factor.bytes()).sum()
+        let bytes = |f: &Entry| f.made.factor.bytes() + f.made.clusters.as_ref().map_or(0, Clusters::bytes);
+        self.factors.iter().map(bytes).sum()
     }
 
     /// Bytes of all columns.

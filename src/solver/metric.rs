@@ -7,6 +7,7 @@
 //! Frames are rounded to about 10⁻⁶ rad. That costs no convergence to speak of, and at rest they
 //! are the same bits in every step, so whatever was made from them can be used again.
 
+use super::clusters::TurnedClusters;
 use super::effort::Effort;
 use super::factor::FactorScratch;
 use super::factor_cache::SystemFactor;
@@ -26,6 +27,9 @@ pub(crate) struct Metric {
     floating: Mat3,
     per_node: Vec<Mat3>,
     deflation: Deflation,
+    clusters: TurnedClusters,
+    /// The clusters take part.
+    turns: bool,
     rhs: Vec<f64>,
     balanced: Vec<Vec3>,
     scratch: FactorScratch,
@@ -64,6 +68,7 @@ impl Metric {
     /// The scalar matrix: no frames.
     pub fn set_isotropic(&mut self) {
         self.kind = FrameKind::Isotropic;
+        self.turns = false;
         self.floating = Mat3::identity();
         self.deflation.active = false;
     }
@@ -71,8 +76,15 @@ impl Metric {
     /// One frame for the body.
     pub fn set_floating(&mut self, rotation: &Mat3) {
         self.kind = FrameKind::Floating;
+        self.turns = false;
         self.floating = rounded_rotation(rotation, FRAME_BITS);
         self.deflation.active = false;
+    }
+
+    /// Lets the clusters of the Laplacian turn along, if the factor has such, from where they are at `x`.
+    pub fn set_clusters(&mut self, factor: &SystemFactor, x: &[Vec3]) {
+        let clusters = factor.clusters.as_ref();
+        self.turns = clusters.is_some_and(|clusters| self.clusters.turn(clusters, x));
     }
 
     /// Turns the body's one frame to `rotation` if that differs by more than `angle` \[rad\]; true if so.
@@ -109,6 +121,7 @@ impl Metric {
         factor: &SystemFactor,
     ) {
         self.kind = FrameKind::PerNode;
+        self.turns = false;
         self.per_node.resize(x.len(), Mat3::zeros());
         node_rotations(model, x, &mut self.per_node);
         self.per_node.iter_mut().for_each(|q| *q = rounded_rotation(q, FRAME_BITS));
@@ -157,6 +170,9 @@ impl Metric {
     pub fn apply(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
         if !self.deflation.active {
             self.rotate_and_solve(factor, r, out);
+            if let Some(clusters) = factor.clusters.as_ref().filter(|_| self.turns) {
+                self.clusters.add(clusters, r, out);
+            }
             return;
         }
         let sum: Vec3 = r.iter().sum();
@@ -213,8 +229,12 @@ impl Metric {
     }
 
     /// The block of P between two surface nodes, given the one of `A⁻¹` [m/N].
-    pub fn compliance(&self, inverse_block: &Mat3, i: usize, j: usize) -> Mat3 {
+    pub fn compliance(&self, factor: &SystemFactor, inverse_block: &Mat3, i: usize, j: usize) -> Mat3 {
         let block = match self.kind {
+            FrameKind::Isotropic if self.turns => match &factor.clusters {
+                Some(clusters) => inverse_block + self.clusters.compliance(clusters, i, j),
+                None => *inverse_block,
+            },
             FrameKind::Isotropic => *inverse_block,
             _ => self.frame(i) * inverse_block * self.frame(j).transpose(),
         };
@@ -230,7 +250,7 @@ impl Metric {
     /// The one frame of the body, if it has one and that is all there is to its blocks.
     pub fn one_frame(&self) -> Option<Mat3> {
         match self.kind {
-            _ if self.deflation.active => None,
+            _ if self.deflation.active || self.turns => None,
             FrameKind::Isotropic => Some(Mat3::identity()),
             FrameKind::Floating => Some(self.floating),
             FrameKind::PerNode => None,

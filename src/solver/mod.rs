@@ -8,6 +8,7 @@ mod anderson;
 mod block_matrix;
 mod body_problem;
 mod chebyshev;
+mod clusters;
 mod columns;
 mod cone_hessian;
 mod cone_newton;

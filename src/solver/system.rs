@@ -22,6 +22,7 @@ pub(crate) struct FactorKey {
     pub solver: Solver,
     pub system: SystemMatrix,
     precision: FactorPrecision,
+    pub clusters: usize,
     elasticity: crate::energy::Elasticity,
     /// Bits of h, E, ν, ρ, α, β, and the modulus of fibres.
     bits: [u64; 7],
@@ -36,6 +37,7 @@ impl FactorKey {
             solver: Solver::default(),
             system: SystemMatrix::default(),
             precision: FactorPrecision::default(),
+            clusters: 0,
             elasticity: body.material.elasticity,
             bits: [0; 7],
             pins: Vec::new(),
@@ -55,6 +57,10 @@ impl FactorKey {
             _ => body.settings().system,
         };
         self.precision = body.settings().precision;
+        self.clusters = match self.system {
+            SystemMatrix::Laplacian if body.model.is_solid() => body.settings().clusters,
+            _ => 0,
+        };
         self.elasticity = m.elasticity;
         self.bits = [h, e, nu, rho, m.mass_damping, m.stiffness_damping, m.fibre_modulus].map(f64::to_bits);
         self.pins.clear();
@@ -133,6 +139,12 @@ pub(crate) fn assemble(
         matrix.add_elastic(i, j, &Mat3::from_diagonal_element(k * stiffening));
     });
     matrix.values
+}
+
+/// Weight of the Laplacian of a material's solids \[Pa\], damping included.
+pub(crate) fn laplacian_weight(material: &DeformableMaterial, h: f64) -> f64 {
+    let stiffening = 1.0 + material.stiffness_damping / h;
+    with_energy!(material, energy => energy.laplacian_weight()) * stiffening
 }
 
 /// The values of a body's Hessian at `x`, in the order of [`Symbolic::rows`], of `3n` unknowns. Of stiffness

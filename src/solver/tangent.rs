@@ -80,6 +80,7 @@ impl Tangents {
             factor,
             system: SystemMatrix::RestStiffness,
             columns,
+            clusters: None,
             serial: u64::MAX - self.count,
         })
     }

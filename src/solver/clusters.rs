@@ -1,0 +1,166 @@
+//! Rotations that the Laplacian resists and should not, given back cluster by cluster.
+//!
+//! The Laplacian holds the projections of all elements still, so what turns or bends meets their full
+//! stiffness. Let the projections of every cluster c turn along, by θ_c, and eliminate θ: with
+//! `Y_c,i = Σ_{e∈c} w V g_e,i` and the rotation Q_c of the cluster, B has the columns `e_a × Q_c Y_c,i`, T is
+//! `2 Σ_{e∈c} w V`, and
+//! `A_eff⁻¹ = A⁻¹ + A⁻¹B (T − BᵀA⁻¹B)⁻¹ BᵀA⁻¹`.
+//! With `Z_c = A⁻¹Y_c` made once, only rotations are left to be done in a step.
+
+use super::factor::{BATCH, Factor, FactorScratch, Symbolic};
+use crate::body::DeformableModel;
+use crate::math::lanes::LANES;
+use crate::math::polar::polar_rotation;
+use crate::math::{Mat3, Vec3, skew};
+use nalgebra::{DMatrix, DVector};
+
+/// The constant part, kept with a factor.
+pub(crate) struct Clusters {
+    /// Per cluster, per node.
+    Y: Vec<Vec<Vec3>>,
+    Z: Vec<Vec<Vec3>>,
+    /// `Σ_i Y_c,i Z_d,iᵀ`, by columns of clusters.
+    products: Vec<Mat3>,
+    /// `2 Σ w V` \[Pa m³\].
+    T: Vec<f64>,
+}
+
+/// What turns with the body.
+#[derive(Default)]
+pub(crate) struct TurnedClusters {
+    frames: Vec<Mat3>,
+    /// `(T − BᵀA⁻¹B)⁻¹`.
+    inverse: DMatrix<f64>,
+    sums: DVector<f64>,
+}
+
+impl Clusters {
+    /// Slices of about equal numbers of elements along the body, which are in that order; `weight` \[Pa\] is that of
+    /// the Laplacian.
+    pub fn new(
+        model: &DeformableModel,
+        count: usize,
+        weight: f64,
+        pins: &[u32],
+        symbolic: &Symbolic,
+        factor: &Factor,
+        scratch: &mut FactorScratch,
+    ) -> Self {
+        let n = model.rest.len();
+        let elements = elements(model);
+        let count = count.min(elements.len()).max(1);
+        let (mut Y, mut T) = (vec![vec![Vec3::zeros(); n]; count], vec![0.0; count]);
+        // By where they are: patches are not in the order of the sweep.
+        let place =
+            |e: &(Vec<(u32, Vec3)>, f64)| e.0.iter().map(|(n, _)| *n as usize).sum::<usize>() / e.0.len();
+        let mut order: Vec<usize> = (0..elements.len()).collect();
+        order.sort_by_key(|&e| place(&elements[e]));
+        for (k, &e) in order.iter().enumerate() {
+            let c = k * count / order.len();
+            let (corners, volume) = &elements[e];
+            T[c] += 2.0 * weight * volume;
+            corners.iter().for_each(|(n, g)| Y[c][*n as usize] += g * (weight * volume));
+        }
+        // Pinned nodes are no unknowns.
+        Y.iter_mut().for_each(|y| pins.iter().for_each(|&p| y[p as usize] = Vec3::zeros()));
+        let mut columns: Vec<f64> = Vec::new();
+        for y in &Y {
+            (0..3).for_each(|c| columns.extend(y.iter().map(|v| v[c])));
+        }
+        for batch in columns.chunks_mut(n * BATCH) {
+            let count = batch.len() / n;
+            symbolic.solve_batch(factor, batch, count, scratch);
+        }
+        let column = |c: usize, axis: usize| &columns[n * (3 * c + axis)..][..n];
+        let Z: Vec<Vec<Vec3>> = (0..count)
+            .map(|c| (0..n).map(|i| Vec3::from_fn(|axis, _| column(c, axis)[i])).collect())
+            .collect();
+        let product = |c: usize, d: usize| {
+            Y[c].iter().zip(&Z[d]).fold(Mat3::zeros(), |sum, (y, z)| sum + y * z.transpose())
+        };
+        let products = (0..count * count).map(|k| product(k % count, k / count)).collect();
+        Self { Y, Z, products, T }
+    }
+
+    pub fn bytes(&self) -> usize {
+        (self.Y.len() + self.Z.len()) * self.Y.first().map_or(0, |y| size_of_val(&y[..]))
+    }
+}
+
+/// Nodes with gradients, and volumes, of whatever is solid in a body.
+fn elements(model: &DeformableModel) -> Vec<(Vec<(u32, Vec3)>, f64)> {
+    if model.is_smoothed() {
+        return model.patches.iter().collect();
+    }
+    let tetrahedra = model.tetrahedra.iter().enumerate().take(LANES * model.blocks.len());
+    let element = |(e, tet): (usize, &[u32; 4])| {
+        let block = &model.blocks[e / LANES];
+        let corners = tet.iter().copied().zip(block.shape_gradients(e % LANES)).collect();
+        (corners, block.volumes.0[e % LANES])
+    };
+    tetrahedra.map(element).collect()
+}
+
+impl TurnedClusters {
+    /// Turns the clusters to where they are at `x`; false where that leaves no definite matrix.
+    pub fn turn(&mut self, clusters: &Clusters, x: &[Vec3]) -> bool {
+        let count = clusters.Y.len();
+        self.frames.clear();
+        for y in &clusters.Y {
+            let moment = x.iter().zip(y).fold(Mat3::zeros(), |sum, (x, y)| sum + x * y.transpose());
+            self.frames.push(polar_rotation(&moment));
+        }
+        let mut matrix = DMatrix::zeros(3 * count, 3 * count);
+        for d in 0..count {
+            for c in 0..count {
+                let M = self.frames[c] * clusters.products[d * count + c] * self.frames[d].transpose();
+                // Σ (e_a × p)·(e_b × q) = δ_ab tr M − M_ba.
+                let block = M.transpose() - Mat3::from_diagonal_element(M.trace());
+                matrix.fixed_view_mut::<3, 3>(3 * c, 3 * d).copy_from(&block);
+            }
+            for a in 0..3 {
+                matrix[(3 * d + a, 3 * d + a)] += clusters.T[d];
+            }
+        }
+        let matrix = (&matrix + matrix.transpose()) * 0.5;
+        let inverse = matrix.cholesky().map(|c| c.inverse());
+        self.inverse = inverse.unwrap_or_default();
+        self.inverse.nrows() > 0
+    }
+
+    fn lever(&self, clusters: &Clusters, c: usize, node: usize) -> Vec3 {
+        self.frames[c] * clusters.Z[c][node]
+    }
+
+    /// Adds to `out = A⁻¹r` what turning along adds.
+    pub fn add(&mut self, clusters: &Clusters, r: &[Vec3], out: &mut [Vec3]) {
+        let count = self.frames.len();
+        let mut sums = std::mem::take(&mut self.sums);
+        sums.resize_vertically_mut(3 * count, 0.0);
+        for (c, (frame, z)) in self.frames.iter().zip(&clusters.Z).enumerate() {
+            let turned = z.iter().zip(r).fold(Vec3::zeros(), |sum, (z, r)| sum + z.cross(&frame.tr_mul(r)));
+            sums.fixed_rows_mut::<3>(3 * c).copy_from(&(frame * turned));
+        }
+        let turns = &self.inverse * &sums;
+        for (c, (frame, z)) in self.frames.iter().zip(&clusters.Z).enumerate() {
+            let turn: Vec3 = turns.fixed_rows::<3>(3 * c).into();
+            let spin = skew(&turn) * frame;
+            out.iter_mut().zip(z).for_each(|(out, z)| *out += spin * z);
+        }
+        self.sums = sums;
+    }
+
+    /// What it adds to the block of `A⁻¹` between two nodes [m/N].
+    pub fn compliance(&self, clusters: &Clusters, i: usize, j: usize) -> Mat3 {
+        let count = self.frames.len();
+        let mut block = Mat3::zeros();
+        for d in 0..count {
+            let from = skew(&self.lever(clusters, d, j));
+            for c in 0..count {
+                let inverse: Mat3 = self.inverse.fixed_view::<3, 3>(3 * c, 3 * d).into();
+                block -= skew(&self.lever(clusters, c, i)) * inverse * from;
+            }
+        }
+        block
+    }
+}
