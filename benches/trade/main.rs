@@ -88,6 +88,26 @@ fn report(
         record.deepest
     );
     let engine = if family == "rapier" { "rapier" } else { "foible3d" };
+    note(scene, engine, family, rung, record, error, csv);
+    points.push(Point {
+        scene: scene.name.clone(),
+        family: family.into(),
+        rung: rung.into(),
+        ms: record.median(),
+        error,
+    });
+}
+
+/// A line of the CSV.
+fn note(
+    scene: &Scene,
+    engine: &str,
+    family: &str,
+    rung: &str,
+    record: &Record,
+    error: f64,
+    csv: &mut String,
+) {
     let _ = writeln!(
         csv,
         "{},{engine},{family} {rung},{},{},{:.5},{:.5},{error:.4e},{:.4e},{:.4e},{:.4e}",
@@ -100,13 +120,6 @@ fn report(
         record.force_error,
         record.deepest
     );
-    points.push(Point {
-        scene: scene.name.clone(),
-        family: family.into(),
-        rung: rung.into(),
-        ms: record.median(),
-        error,
-    });
 }
 
 /// The presets at 1000, 4000 and 16000 tetrahedra: a cantilever let go, and the same at rest.
@@ -132,7 +145,7 @@ fn preset_table(csv: &mut String, points: &mut Vec<Point>) {
                 errors[1]
             );
             for (k, scene) in [&swing, &sag].into_iter().enumerate() {
-                report_quietly(scene, &rung, &records[k], errors[k], csv, points);
+                note(scene, "foible3d", "preset", &rung.name, &records[k], errors[k], csv);
             }
         }
         for setting in rapier::SETTINGS {
@@ -143,36 +156,6 @@ fn preset_table(csv: &mut String, points: &mut Vec<Point>) {
             }
         }
     }
-}
-
-fn report_quietly(
-    scene: &Scene,
-    rung: &Rung,
-    record: &Record,
-    error: f64,
-    csv: &mut String,
-    points: &mut Vec<Point>,
-) {
-    let _ = writeln!(
-        csv,
-        "{},foible3d,{},{},{},{:.5},{:.5},{error:.4e},{:.4e},{:.4e},{:.4e}",
-        scene.name,
-        rung.name,
-        scene.tets(),
-        scene.dt,
-        record.median(),
-        record.worst(),
-        record.volume_error,
-        record.force_error,
-        record.deepest
-    );
-    points.push(Point {
-        scene: format!("{} {}", scene.name, scene.tets()),
-        family: rung.family.clone(),
-        rung: rung.name.clone(),
-        ms: record.median(),
-        error,
-    });
 }
 
 /// What the mesh costs: tips at rest over Timoshenko's beam, and milliseconds of a swing, with plain and smoothed
@@ -238,7 +221,7 @@ fn step_table(csv: &mut String) {
                 rung.name,
                 record.median()
             );
-            report_quietly(&scene, &rung, &record, error, csv, &mut Vec::new());
+            note(&scene, "foible3d", "steps", &rung.name, &record, error, csv);
         }
     }
 }

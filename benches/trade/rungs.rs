@@ -71,7 +71,7 @@ pub fn rungs(scene: &Scene) -> Vec<Rung> {
         }
     }
     if is_solid {
-        for n in [3, 10] {
+        for n in [1, 2, 3, 10] {
             let clusters = SolverSettings { system: SystemMatrix::Laplacian, clusters: 8, ..with(n) };
             rungs.push(rung("Laplacian, 8 clusters", format!("{n}"), clusters));
         }

@@ -8,10 +8,15 @@ mod attachment;
 #[allow(clippy::module_inception)]
 mod body;
 mod builder;
+mod controls;
 pub(crate) mod elastic;
 mod elements;
+mod forces;
 mod model;
+mod motion;
 pub(crate) mod patches;
+mod pins;
+mod report;
 mod set;
 mod settings;
 mod sleep;
@@ -21,9 +26,10 @@ mod thin;
 
 pub(crate) use attachment::{Anchors, Hold};
 pub use attachment::{AttachTo, DeformableAttachment, DeformableAttachmentHandle};
-pub use body::{BodyError, DeformableBody, Pin};
+pub use body::{BodyError, DeformableBody};
 pub use builder::DeformableBodyBuilder;
 pub use model::DeformableModel;
+pub use pins::Pin;
 pub use set::{DeformableBodyHandle, DeformableBodySet};
 pub use settings::{
     Acceleration, FactorPrecision, Fidelity, Frames, Integrator, Solver, SolverSettings, SystemMatrix,

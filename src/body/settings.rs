@@ -120,8 +120,8 @@ impl Default for Acceleration {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Fidelity {
-    /// Three iterations of the [`SystemMatrix::Laplacian`], with eight clusters: the smallest factors, and motion
-    /// that looks right.
+    /// One iteration of the [`SystemMatrix::Laplacian`], with eight clusters: the smallest factors, the fewest
+    /// solves, and motion that looks right.
     Preview,
     /// The defaults, at three times their tolerance.
     Game,
@@ -164,7 +164,7 @@ impl Fidelity {
         match (self, build) {
             (Self::Preview, Build::Rope) => SolverSettings { max_iterations: 1, tolerance: 0.0, ..newton },
             (Self::Preview, _) => {
-                SolverSettings { max_iterations: 3, tolerance: 0.0, clusters: 8, ..laplacian }
+                SolverSettings { max_iterations: 1, tolerance: 0.0, clusters: 8, ..laplacian }
             }
             (Self::Game, Build::Solid) => SolverSettings { tolerance: 3.0 * defaults.tolerance, ..defaults },
             (Self::Game, _) => build.defaults(),

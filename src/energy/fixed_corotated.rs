@@ -2,7 +2,7 @@
 //!
 //! Stress `P = 2μ(F − R) + λ(J − 1) cof F`.
 
-use super::{ElementEnergy, Principal, Response, determinant_terms};
+use super::{ElementEnergy, Principal, Response, determinant_terms, invariants};
 use crate::material::Lame;
 use crate::math::lanes::{Lane, LaneMat3};
 use crate::math::polar::polar_rotations;
@@ -18,10 +18,7 @@ impl ElementEnergy for FixedCorotated {
         let rotation = polar_rotations(F);
         let deviation = F.minus(&rotation);
         let cofactor = F.cofactor();
-        // det F − 1 in D = F − R, without the cancellation.
-        let (size, trace) = (deviation.dot(&deviation), rotation.dot(&deviation));
-        let third = deviation.dot(&deviation.cofactor()) * (1.0 / 3.0);
-        let excess = trace + (trace * trace - size) * 0.5 + third;
+        let [size, _, _, excess] = invariants(&deviation, &rotation);
         Response {
             density: size * mu + excess * excess * (0.5 * lambda),
             stress: deviation.scaled(Lane::splat(2.0 * mu)).plus_scaled(&cofactor, excess * lambda),

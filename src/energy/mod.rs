@@ -118,6 +118,15 @@ macro_rules! limited_or_not {
 }
 pub(crate) use limited_or_not;
 
+/// `‖D‖²`, `R : D`, `det D` and `det F − 1 = R:D + ((R:D)² − ‖D‖²)/2 + det D` of `D = F − R`: nothing that is small
+/// is a difference of what is not.
+#[inline(always)]
+fn invariants(deviation: &LaneMat3, rotation: &LaneMat3) -> [Lane; 4] {
+    let (size, trace) = (deviation.dot(deviation), rotation.dot(deviation));
+    let third = deviation.dot(&deviation.cofactor()) * (1.0 / 3.0);
+    [size, trace, third, trace + (trace * trace - size) * 0.5 + third]
+}
+
 /// The product of three stretches, its gradient and its second derivatives.
 fn determinant_terms(s: &Vec3) -> (f64, Vec3, Mat3) {
     let slope = Vec3::new(s.y * s.z, s.z * s.x, s.x * s.y);

@@ -4,7 +4,7 @@
 //! At small strain linear elasticity of (μ, λ); finite at any F, inverted ones included. Stress
 //! `P = μF + (λ′(J − 1) − μ) cof F`.
 
-use super::{ElementEnergy, Principal, Response, determinant_terms};
+use super::{ElementEnergy, Principal, Response, determinant_terms, invariants};
 use crate::material::Lame;
 use crate::math::lanes::{Lane, LaneMat3};
 use crate::math::polar::polar_rotations;
@@ -18,14 +18,11 @@ impl ElementEnergy for NeoHookean {
     fn evaluate(&self, F: &LaneMat3) -> Response {
         let Lame { mu, lambda } = self.0;
         let volumetric = lambda + mu;
-        // The rotation is not part of the energy; frames and damping ask for it. With D = F − R nothing that is
-        // small is a difference of what is not: J − 1 = R:D + (tr² − ‖D‖²)/2 + det D.
+        // The rotation is not part of the energy; frames and damping ask for it, and small strains are exact in F − R.
         let rotation = polar_rotations(F);
         let deviation = F.minus(&rotation);
         let cofactor = F.cofactor();
-        let (size, trace) = (deviation.dot(&deviation), rotation.dot(&deviation));
-        let third = deviation.dot(&deviation.cofactor()) * (1.0 / 3.0);
-        let excess = trace + (trace * trace - size) * 0.5 + third;
+        let [size, trace, third, excess] = invariants(&deviation, &rotation);
         Response {
             density: (size - trace * trace * 0.5 - third) * mu + excess * excess * (0.5 * volumetric),
             // μ(F − R) − μ(cof F − R) + λ′(J − 1) cof F.

@@ -2,6 +2,7 @@
 
 mod contacts;
 mod encounters;
+mod ending;
 mod grouping;
 mod parameters;
 #[allow(clippy::module_inception)]

@@ -7,6 +7,7 @@
 
 use super::contacts::{DeformableContact, DeformablePairContact, JointForce, RigidContact};
 use super::encounters::Encounters;
+use super::ending::{give_forces, quarantine, store};
 use super::grouping::Grouping;
 use super::parameters::{DeformableCounters, DeformableParameters};
 use super::readout::{add_attachment_forces, list_closure, list_contacts, list_pair_contacts};
@@ -14,8 +15,8 @@ use super::sleeping::Sleeping;
 use super::threads::for_each;
 use super::work::{BodyWork, IslandWork};
 use crate::body::{
-    DeformableAttachment, DeformableBody, DeformableBodyHandle, DeformableBodySet, DeformableState, Hold,
-    Integrator, is_number,
+    DeformableAttachment, DeformableBody, DeformableBodyHandle, DeformableBodySet, Hold, Integrator,
+    is_number,
 };
 use crate::contact::{Candidates, Row, Side};
 use crate::coupling::{
@@ -23,7 +24,7 @@ use crate::coupling::{
 };
 use crate::error::DeformableBodyError;
 use crate::math::from_real;
-use crate::solver::{BodyProblem, FactorCache, FactorKey, ROUNDING, Reaction, SECOND_ORDER};
+use crate::solver::{FactorCache, FactorKey, Reaction, SECOND_ORDER};
 use rapier3d::math::Vector;
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
@@ -414,61 +415,6 @@ impl DeformablePipeline {
             }
             let (scene, candidates) = (&self.scene, &self.candidates);
             self.sleeping.fall_asleep(island, &self.slept, deformables, scene, candidates, sets, &gravity, h);
-        }
-    }
-}
-
-/// Puts a body aside whose state is not finite, or would become so: its step is not taken.
-fn quarantine(body: &mut DeformableBody, counters: &mut DeformableCounters) {
-    body.set_enabled(false);
-    body.report.quarantined = true;
-    counters.quarantined += 1;
-}
-
-fn store(
-    body: &mut DeformableBody,
-    work: &IslandWork,
-    local: usize,
-    h: f64,
-    counters: &mut DeformableCounters,
-) {
-    let problem = &work.island.bodies[local];
-    body.state.history.clear();
-    if problem.settings.integrator == Integrator::Bdf2 && work.island.contacts.is_empty() {
-        let DeformableState { x, v, history, .. } = &mut body.state;
-        history.h = h;
-        history.x.clone_from(x);
-        history.v.clone_from(v);
-    }
-    let in_flight = work.island.contacts.active() == 0;
-    problem.end_velocities(in_flight, &mut body.state.v);
-    body.state.x.clone_from(&problem.current.x);
-    let share = problem.pin_share();
-    for pin in &mut body.pins {
-        pin.force = problem.pin_force(pin.node, &share);
-    }
-    work.memory_of(local, h, &mut body.state.contacts);
-    body.state.closure.clear();
-    if local == 0 {
-        work.memory_of_links(h, &mut body.state.closure);
-    }
-    body.report.iterations = work.island.report.iterations;
-    body.report.residual = problem.residual();
-    body.report.tolerance = problem.settings.tolerance.max(ROUNDING) * problem.force_scale();
-    body.report.guard_retries = problem.guard_retries;
-    counters.guard_retries += problem.guard_retries;
-    counters.not_converged += usize::from(!body.last_converged());
-}
-
-/// Gives attachments the forces with which they hold nodes of a body.
-fn give_forces(problem: &BodyProblem, deformables: &mut DeformableBodySet) {
-    if problem.holds.is_empty() {
-        return;
-    }
-    let share = problem.pin_share();
-    for hold in &problem.holds {
-        if let Some(attachment) = deformables.attachment_mut(hold.attachment) {
-            attachment.force += problem.pin_force(hold.node, &share);
         }
     }
 }

@@ -9,27 +9,16 @@ use super::factor_cache::{FactorId, SystemFactor};
 use super::metric::Metric;
 use super::system::FactorKey;
 use crate::body::elastic::{self, Elements, StiffnessDamping};
-use crate::body::{
-    DeformableBody, DeformableModel, Frames, Hold, Integrator, Solver, SolverSettings, SystemMatrix,
-};
+use crate::body::{DeformableBody, DeformableModel, Hold, Integrator, SolverSettings};
 use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3, rotation_from_vector, skew};
 use std::sync::Arc;
 
-/// Largest rotation of an element against the body's frame for which one frame serves.
-const FLOATING_LIMIT: f64 = 20.0 * std::f64::consts::PI / 180.0;
-
 /// Error of the body's frame \[rad\] beyond which it is refreshed within a step.
-const FRAME_ERROR: f64 = 1.0e-4;
+pub(super) const FRAME_ERROR: f64 = 1.0e-4;
 
 /// Step of the matrix over that of time, of the second order.
 pub(crate) const SECOND_ORDER: f64 = 2.0 / 3.0;
-
-/// Largest turn \[rad\] that [`BodyProblem::balance`] takes for the rest of an iteration.
-const MAX_BALANCING_TURN: f64 = 0.1;
-
-/// Largest rotation \[rad\] in a step that [`BodyProblem::end_velocities`] gives back.
-const MAX_SPIN_GIVEN: f64 = 0.5;
 
 /// A body's step in the making.
 pub(crate) struct BodyProblem {
@@ -38,22 +27,22 @@ pub(crate) struct BodyProblem {
     pub factor: FactorId,
     pub model: Arc<DeformableModel>,
     pub settings: SolverSettings,
-    material: DeformableMaterial,
-    activation: f64,
+    pub(super) material: DeformableMaterial,
+    pub(super) activation: f64,
     /// The step that the matrix is of \[s\], and that by which time goes on.
-    h: f64,
-    dt: f64,
+    pub(super) h: f64,
+    pub(super) dt: f64,
     /// Goes forward by two steps.
-    is_second_order: bool,
+    pub(super) is_second_order: bool,
     /// Positions and velocities at the start of the step; of the second order what they amount to.
     pub x_start: Vec<Vec3>,
     pub v_start: Vec<Vec3>,
     /// Angular momentum at the start.
-    spin: Vec3,
+    pub(super) spin: Vec3,
     /// Where the nodes would go without internal and contact forces.
     pub target: Vec<Vec3>,
-    masses: Vec<f64>,
-    damping: StiffnessDamping,
+    pub(super) masses: Vec<f64>,
+    pub(super) damping: StiffnessDamping,
     pub current: Iterate,
     pub trial: Iterate,
     /// Contact forces on the nodes \[N\].
@@ -66,14 +55,14 @@ pub(crate) struct BodyProblem {
     pub guard_retries: usize,
     /// A force that counts as large for this body \[N\].
     pub weight: f64,
-    step: Vec<Vec3>,
-    force: Vec<Vec3>,
+    pub(super) step: Vec<Vec3>,
+    pub(super) force: Vec<Vec3>,
     /// The body's frame at the start of the iteration.
-    frame: Mat3,
+    pub(super) frame: Mat3,
     /// Nodes that attachments hold, ascending; pinned for the step.
     pub holds: Vec<Hold>,
     /// Where the pinned nodes would go by inertia and external forces.
-    pinned_inertia: Vec<Vec3>,
+    pub(super) pinned_inertia: Vec<Vec3>,
 }
 
 /// A point of the iteration with what was evaluated there.
@@ -197,47 +186,6 @@ impl BodyProblem {
         self.weight = mass * g.norm() / n as f64;
     }
 
-    /// Chooses where the iteration starts, and the frames of the metric: the rigidly extrapolated
-    /// shape or the inertial target, whichever has the lower Ψ.
-    pub fn choose_start(&mut self, factor: &SystemFactor) {
-        let model = self.model.clone();
-        let is_pinned = !self.key.pins.is_empty();
-        if is_pinned {
-            // What is held does not fall: by its motion alone, so that what hangs still starts where it is.
-            let drift = self.x_start.iter().zip(&self.v_start).map(|(x, v)| x + v * self.h);
-            self.force.clear();
-            self.force.extend(drift);
-            self.key.pins.iter().for_each(|&p| self.force[p as usize] = self.target[p as usize]);
-        }
-        let goes_to = if is_pinned { &self.force } else { &self.target };
-        let (turned, _, centre) = elastic::floating_frame(&model, goes_to);
-        let (before, _, centre_before) = elastic::floating_frame(&model, &self.x_start);
-        let turn = turned * before.transpose();
-        self.current.x.clear();
-        let carried = self.x_start.iter().map(|x| centre + turn * (x - centre_before));
-        self.current.x.extend(carried);
-        if is_pinned {
-            // Shift so that the pinned nodes fit on average, then put them where they belong.
-            let miss = |&p: &u32| self.target[p as usize] - self.current.x[p as usize];
-            let shift = self.key.pins.iter().map(miss).sum::<Vec3>() / self.key.pins.len() as f64;
-            self.current.x.iter_mut().for_each(|x| *x += shift);
-            for &p in &self.key.pins {
-                self.current.x[p as usize] = self.target[p as usize];
-            }
-        }
-        self.frame = turned;
-        self.evaluate_current();
-        self.trial.x.clone_from(&self.target);
-        let mut trial = std::mem::take(&mut self.trial);
-        self.evaluate(&mut trial, self.current.objective);
-        self.trial = trial;
-        // Written so that a non-finite extrapolation loses.
-        if !(self.current.objective <= self.trial.objective) {
-            self.accept_trial();
-        }
-        self.choose_frames(&turned, factor);
-    }
-
     /// What is elastic in the body.
     pub fn elements(&self) -> Elements<'_> {
         Elements { model: &self.model, material: &self.material, activation: self.activation }
@@ -246,47 +194,6 @@ impl BodyProblem {
     /// The step \[s\] that the matrix is of.
     pub fn h(&self) -> f64 {
         self.h
-    }
-
-    fn choose_frames(&mut self, turned: &Mat3, factor: &SystemFactor) {
-        // The Hessian is that of the world.
-        if self.settings.solver == Solver::Newton {
-            return self.metric.set_floating(&Mat3::identity());
-        }
-        let mobility = self.h * self.h / (1.0 + self.material.mass_damping * self.h);
-        let is_free = self.key.pins.is_empty();
-        let per_node = factor.system != SystemMatrix::Laplacian
-            && match self.settings.frames {
-                Frames::Floating => false,
-                Frames::PerNode => true,
-                Frames::Automatic => self.current.least_trace < 1.0 + 2.0 * FLOATING_LIMIT.cos(),
-            };
-        if per_node {
-            let (x, masses) = (&self.current.x, &self.masses);
-            return self.metric.set_per_node(&self.model, x, masses, mobility, is_free, factor);
-        }
-        match factor.system {
-            SystemMatrix::Laplacian => self.metric.set_isotropic(),
-            SystemMatrix::RestStiffness => self.metric.set_floating(turned),
-        }
-        if is_free && factor.factor.is_rough() {
-            self.metric.deflate(&self.masses, mobility, factor);
-        } else {
-            self.metric.set_clusters(factor, &self.current.x);
-        }
-    }
-
-    /// Turns the one frame of the body after the current iterate, where a contact has turned the body
-    /// against its free motion; true if it did. The rest stiffness in a frame that is off by θ resists
-    /// rotation with θ² of its stiffness.
-    pub fn refresh_frame(&mut self) -> bool {
-        let has_no_frame =
-            self.key.system == SystemMatrix::Laplacian || self.settings.solver == Solver::Newton;
-        if self.metric.is_per_node() || has_no_frame {
-            return false;
-        }
-        let (turned, _, _) = elastic::floating_frame(&self.model, &self.current.x);
-        self.metric.turn_floating(&turned, FRAME_ERROR)
     }
 
     /// Sets the trial to `x + P(r + Jᵀλ⁰)/c`.
@@ -344,63 +251,6 @@ impl BodyProblem {
         true
     }
 
-    /// Moves and turns a body that nothing holds as a whole, so that its residual has neither force nor
-    /// moment: what is left of it after a few iterations would set the body spinning. Deforms nothing.
-    pub fn balance(&mut self) {
-        let mobility = self.h * self.h / (1.0 + self.material.mass_damping * self.h);
-        let total: f64 = self.masses.iter().sum();
-        let x = &mut self.current.x;
-        let centre = x.iter().zip(&self.masses).map(|(x, m)| x * *m).sum::<Vec3>() / total;
-        let (mut force, mut moment, mut inertia) = (Vec3::zeros(), Vec3::zeros(), Mat3::zeros());
-        for ((x, r), m) in x.iter().zip(&self.current.r).zip(&self.masses) {
-            let arm = x - centre;
-            force += r;
-            moment += arm.cross(r);
-            inertia += (Mat3::identity() * arm.norm_squared() - arm * arm.transpose()) * *m;
-        }
-        let Some(turn) = inertia.try_inverse().map(|inverse| inverse * moment * mobility) else {
-            return;
-        };
-        if !(turn.norm() < MAX_BALANCING_TURN) {
-            return;
-        }
-        let (rotation, shift) = (rotation_from_vector(&turn), force * (mobility / total));
-        x.iter_mut().for_each(|x| *x = centre + shift + rotation * (*x - centre));
-    }
-
-    /// Velocities at the end of the step [m/s]; `in_flight` tells that nothing touched or tied the body. Implicit
-    /// Euler then loses angular momentum that nothing has taken: a rotation about the centre of mass puts
-    /// it back.
-    pub fn end_velocities(&self, in_flight: bool, v: &mut Vec<Vec3>) {
-        v.clear();
-        v.extend(self.current.x.iter().zip(&self.x_start).map(|(new, old)| (new - old) / self.h));
-        if !(in_flight && self.settings.keeps_spin && self.key.pins.is_empty()) {
-            return;
-        }
-        let total: f64 = self.masses.iter().sum();
-        let mean = |p: &[Vec3]| p.iter().zip(&self.masses).map(|(p, m)| p * *m).sum::<Vec3>() / total;
-        let centre = mean(&self.current.x);
-        let inertial = |i: usize| self.target[i] - self.x_start[i] - self.v_start[i] * self.h;
-        let (mut gained, mut lost) = (Vec3::zeros(), Vec3::zeros());
-        let mut inertia = Mat3::zeros();
-        for (i, m) in self.masses.iter().enumerate() {
-            let arm = self.current.x[i] - centre;
-            // External forces act where the nodes are at the end of the step, as in the step itself.
-            gained += arm.cross(&inertial(i)) * (*m / (self.h * self.h) * self.dt);
-            lost += arm.cross(&v[i]) * *m;
-            inertia += (Mat3::identity() * arm.norm_squared() - arm * arm.transpose()) * *m;
-        }
-        let drag = 1.0 + self.material.mass_damping * self.dt;
-        let missing = (self.spin + gained) / drag - lost;
-        let Some(turn) = inertia.try_inverse().map(|inverse| inverse * missing) else { return };
-        // What has no width about some axis has no spin about it, but for roundings.
-        if turn.norm() * self.h < MAX_SPIN_GIVEN {
-            for (v, x) in v.iter_mut().zip(&self.current.x) {
-                *v += turn.cross(&(x - centre));
-            }
-        }
-    }
-
     /// Pinned nodes are rows of the identity in A, without neighbours: what the solve says of them
     /// is no motion.
     fn add_step(&mut self) {
@@ -418,28 +268,6 @@ impl BodyProblem {
         self.key.pins.iter().for_each(|&p| out[p as usize] = Vec3::zeros());
     }
 
-    /// What the iteration has left of the forces on free nodes \[N\], per pinned node: the pins carry it too, so
-    /// that with gravity and contacts they add up to what moves the body.
-    pub fn pin_share(&self) -> Vec3 {
-        let mut left = Vec3::zeros();
-        let mut pins = self.key.pins.iter().peekable();
-        for (i, (r, f)) in self.current.r.iter().zip(&self.contact_force).enumerate() {
-            if pins.next_if(|&&p| p as usize == i).is_none() {
-                left += r + f;
-            }
-        }
-        left / self.key.pins.len().max(1) as f64
-    }
-
-    /// Force \[N\] with which a pinned node is held; `share` is [`BodyProblem::pin_share`].
-    pub fn pin_force(&self, node: u32, share: &Vec3) -> Vec3 {
-        let Ok(k) = self.key.pins.binary_search(&node) else { return Vec3::zeros() };
-        let node = node as usize;
-        let inertia =
-            (self.pinned_inertia[k] - self.current.x[node]) * (self.masses[node] / (self.h * self.h));
-        -(inertia + self.current.r[node] + self.contact_force[node]) - share
-    }
-
     pub fn evaluate_current(&mut self) {
         let mut iterate = std::mem::take(&mut self.current);
         self.evaluate(&mut iterate, f64::INFINITY);
@@ -453,7 +281,7 @@ impl BodyProblem {
     }
 
     /// Given up, with an infinite objective, where that would exceed `limit` \[J\].
-    fn evaluate(&mut self, at: &mut Iterate, limit: f64) {
+    pub(super) fn evaluate(&mut self, at: &mut Iterate, limit: f64) {
         at.r.clear();
         at.r.resize(at.x.len(), Vec3::zeros());
         let (model, material, activation) = (&*self.model, &self.material, self.activation);

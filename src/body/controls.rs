@@ -1,0 +1,137 @@
+//! What its user sets of a body besides its motion.
+
+use super::body::DeformableBody;
+use super::settings::{Acceleration, SolverSettings};
+use crate::material::{DeformableMaterial, MaterialError};
+use rapier3d::dynamics::CoefficientCombineRule;
+use rapier3d::geometry::InteractionGroups;
+
+/// Clusters of a body at the most.
+const MAX_CLUSTERS: usize = 32;
+
+impl DeformableBody {
+    /// The material.
+    pub fn material(&self) -> &DeformableMaterial {
+        &self.material
+    }
+
+    /// Changes the material. The next step makes a new factor.
+    ///
+    /// # Errors
+    /// [`MaterialError`]; the material stays as it was then.
+    pub fn set_material(&mut self, material: DeformableMaterial) -> Result<(), MaterialError> {
+        self.wake_up();
+        material.validate()?;
+        self.material = material;
+        Ok(())
+    }
+
+    /// The knobs of the solver.
+    pub fn settings(&self) -> &SolverSettings {
+        &self.settings
+    }
+
+    /// Sets the knobs of the solver; out-of-range ones are brought into range.
+    pub fn set_settings(&mut self, settings: SolverSettings) {
+        self.wake_up();
+        let mut settings = settings;
+        settings.max_iterations = settings.max_iterations.max(1);
+        settings.clusters = settings.clusters.min(MAX_CLUSTERS);
+        // NaN too becomes zero: iterate to the limit.
+        settings.tolerance = settings.tolerance.max(0.0);
+        match &mut settings.acceleration {
+            Acceleration::Lbfgs { window } | Acceleration::Anderson { window } => {
+                *window = (*window).clamp(1, 16);
+            }
+            Acceleration::Chebyshev { radius } => {
+                *radius = if radius.is_nan() { 0.0 } else { radius.clamp(0.0, 0.9999) };
+            }
+            Acceleration::None => {}
+        }
+        self.settings = settings;
+    }
+
+    /// Stretch that muscle fibres want to have [–]: one at rest, less when they contract.
+    pub fn activation(&self) -> f64 {
+        self.activation
+    }
+
+    /// Sets the stretch that muscle fibres want to have; brought into 0 to 10, one if it is no number.
+    pub fn set_activation(&mut self, stretch: f64) {
+        self.wake_up();
+        self.activation = if stretch.is_nan() { 1.0 } else { stretch.clamp(0.0, 10.0) };
+    }
+
+    /// Factor on gravity.
+    pub fn gravity_scale(&self) -> f64 {
+        self.gravity_scale
+    }
+
+    /// Sets the factor on gravity; a non-finite one is taken as zero.
+    pub fn set_gravity_scale(&mut self, scale: f64) {
+        self.wake_up();
+        self.gravity_scale = if scale.is_finite() { scale } else { 0.0 };
+    }
+
+    /// Whether the body takes part in the simulation.
+    pub fn is_enabled(&self) -> bool {
+        self.enabled
+    }
+
+    /// Takes the body out of the simulation, or back in.
+    pub fn set_enabled(&mut self, enabled: bool) {
+        self.wake_up();
+        self.enabled = enabled;
+        self.report.quarantined &= !enabled;
+    }
+
+    /// Whether the last step had to be undone because the state became non-finite; the body is
+    /// then disabled and stays where it was. [`DeformableBody::set_enabled`] ends it.
+    pub fn is_quarantined(&self) -> bool {
+        self.report.quarantined
+    }
+
+    /// Whether the body collides with itself.
+    pub fn self_contact(&self) -> bool {
+        self.self_contact
+    }
+
+    /// Lets the body collide with itself: for slender ones, which may fold.
+    pub fn set_self_contact(&mut self, self_contact: bool) {
+        self.wake_up();
+        self.self_contact = self_contact;
+    }
+
+    /// Which colliders and deformable bodies the body collides with, by rapier's rules.
+    pub fn collision_groups(&self) -> InteractionGroups {
+        self.collision_groups
+    }
+
+    /// Sets which colliders and deformable bodies the body collides with.
+    pub fn set_collision_groups(&mut self, groups: InteractionGroups) {
+        self.wake_up();
+        self.collision_groups = groups;
+    }
+
+    /// How friction combines with that of what it touches.
+    pub fn friction_combine_rule(&self) -> CoefficientCombineRule {
+        self.friction_combine_rule
+    }
+
+    /// Sets how friction combines with that of what it touches.
+    pub fn set_friction_combine_rule(&mut self, rule: CoefficientCombineRule) {
+        self.wake_up();
+        self.friction_combine_rule = rule;
+    }
+
+    /// How restitution combines with that of what it touches.
+    pub fn restitution_combine_rule(&self) -> CoefficientCombineRule {
+        self.restitution_combine_rule
+    }
+
+    /// Sets how restitution combines with that of what it touches.
+    pub fn set_restitution_combine_rule(&mut self, rule: CoefficientCombineRule) {
+        self.wake_up();
+        self.restitution_combine_rule = rule;
+    }
+}

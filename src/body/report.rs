@@ -1,0 +1,36 @@
+//! How the last step of a body went.
+
+use super::body::DeformableBody;
+
+/// How the last step of a body went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct StepReport {
+    pub iterations: usize,
+    pub residual: f64,
+    pub tolerance: f64,
+    pub guard_retries: usize,
+    pub quarantined: bool,
+}
+
+impl DeformableBody {
+    /// Global iterations of the last step.
+    pub fn last_iterations(&self) -> usize {
+        self.report.iterations
+    }
+
+    /// Largest residual force on a node after the last step \[N\].
+    pub fn last_residual(&self) -> f64 {
+        self.report.residual
+    }
+
+    /// Whether the last step ended below its tolerance.
+    pub fn last_converged(&self) -> bool {
+        self.report.residual <= self.report.tolerance
+    }
+
+    /// How often the last step had to be done again because it would have raised the energy: without the quasi-Newton
+    /// update, or with a scaled metric.
+    pub fn last_guard_retries(&self) -> usize {
+        self.report.guard_retries
+    }
+}
