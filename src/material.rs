@@ -46,7 +46,7 @@ pub struct DeformableMaterial {
     pub stiffness_damping: f64,
     /// The elastic energy of tetrahedra. Triangles of cloth, rods and springs have their own.
     pub elasticity: Elasticity,
-    /// Least and largest principal stretch [–]: beyond, the material is stiffer by twenty times.
+    /// Least and largest principal stretch [–]: beyond, twenty times Young's modulus comes on top.
     pub strain_limits: Option<[f64; 2]>,
     /// Young's modulus of muscle fibres along their direction \[Pa\], of bodies that have such.
     pub fibre_modulus: f64,

@@ -178,3 +178,74 @@ fn cable_without_compliance_does_not_stretch_under_a_thousand_times_the_weight_a
     println!("loaded: farthest {farthest:.6} m, force/weight {:.3}", force / weight);
     assert!(farthest < 0.5 * 1.001 && (force / weight / 1000.0 - 1.0).abs() < 1e-3);
 }
+
+#[test]
+fn node_that_two_attachments_and_a_pin_hold_carries_no_more_than_the_weight() {
+    let mut physics = PhysicsWorld::new();
+    let frame = RigidBodyBuilder::kinematic_position_based().translation(Vector::new(0.3, 0.7, -0.2));
+    let frame = physics.insert_body(frame);
+    let mut world = DeformableWorld::new();
+    let body = world.insert(slab().pinned(|x| x.x < -0.199 && x.z < -0.09)).unwrap();
+    let ends = left(&world.bodies[body]);
+    let on = || AttachTo::RigidBody(frame, *physics.bodies[frame].position());
+    let ties = [
+        world.bodies.attach(body, &ends, on()).unwrap(),
+        world.bodies.attach(body, &ends[1..], on()).unwrap(),
+        world.bodies.attach(body, &ends[..1], AttachTo::World).unwrap(),
+    ];
+    for step in 0..120 {
+        // Away, once it hangs still.
+        let away = Vector::new(0.3, 0.7 + 0.001 * (step as f32 - 60.0).max(0.0), -0.2);
+        physics.bodies[frame].set_next_kinematic_translation(away);
+        world.step(&mut physics);
+        for tie in ties {
+            let force = world.bodies.attachment(tie).unwrap().force();
+            assert!(force.length() < 1e5, "step {step}: {force}");
+        }
+    }
+    assert!(world.bodies[body].is_enabled() && world.bodies[body].max_speed() < 1.0);
+}
+
+#[test]
+fn attachment_of_infinite_compliance_holds_nothing_and_disturbs_nothing() {
+    let (mut physics, floor) = world_with_floor(1.0 / 60.0);
+    let mut world = DeformableWorld::new();
+    let body = world.insert(slab().translation(Vector::Y * 0.3)).unwrap();
+    let ends = left(&world.bodies[body]);
+    let tie = world.bodies.attach(body, &ends, AttachTo::World).unwrap();
+    world.bodies.attachment_mut(tie).unwrap().set_compliance(f64::INFINITY);
+    for _ in 0..240 {
+        world.step(&mut physics);
+    }
+    let force: f64 = world.contacts_with(floor).map(|c| f64::from(c.force.y)).sum();
+    assert!((force / (world.bodies[body].mass() * G) - 1.0).abs() < 1e-3, "{force}");
+}
+
+#[test]
+fn breaking_wakes_what_sleeps_on_it_and_so_does_removing_what_it_is_tied_to() {
+    for breaks in [true, false] {
+        let mut physics = PhysicsWorld::new();
+        let anchor = physics.insert_body(RigidBodyBuilder::fixed().translation(Vector::Y));
+        let mut world = DeformableWorld::new();
+        let body = slab().material(DeformableMaterial::new(1e6, 0.3).mass_damping(8.0)).can_sleep(true);
+        let body = world.insert(body).unwrap();
+        let ends = left(&world.bodies[body]);
+        let on = AttachTo::RigidBody(anchor, *physics.bodies[anchor].position());
+        let tie = world.bodies.attach(body, &ends, on).unwrap();
+        for _ in 0..400 {
+            world.step(&mut physics);
+        }
+        assert!(world.bodies[body].is_sleeping());
+        if breaks {
+            world.bodies.attachment_mut(tie).unwrap().set_break_force(1.0);
+        } else {
+            physics.remove_body(anchor);
+        }
+        let before = world.bodies[body].center_of_mass()[1];
+        for _ in 0..30 {
+            world.step(&mut physics);
+        }
+        let fallen = before - world.bodies[body].center_of_mass()[1];
+        assert!(fallen > 0.1, "breaks {breaks}: {fallen}");
+    }
+}

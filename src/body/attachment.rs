@@ -37,6 +37,8 @@ pub struct DeformableAttachment {
     pub(crate) broken: bool,
     /// Something was changed since the last step.
     changed: bool,
+    /// Where the rigid body was when last looked at.
+    rigid_pose: Option<Pose64>,
 }
 
 /// Where the nodes are tied.
@@ -83,7 +85,7 @@ impl DeformableAttachment {
         self.compliance
     }
 
-    /// Changes the compliance [m/N]; negative values and NaN are taken for zero.
+    /// Changes the compliance [m/N]; negative values and NaN are taken for zero, infinity lets go.
     pub fn set_compliance(&mut self, compliance: f64) {
         self.compliance = compliance.max(0.0);
         self.changed = true;
@@ -108,6 +110,7 @@ impl DeformableAttachment {
 
     /// Changes the breaking force \[N\].
     pub fn set_break_force(&mut self, force: f64) {
+        self.changed = true;
         self.break_force = force;
     }
 
@@ -128,8 +131,11 @@ impl DeformableAttachment {
     }
 
     /// Moves the places in the world, or on the rigid body in its frame, by `by` \[m\]. Does nothing to
-    /// attachments between deformable bodies.
+    /// attachments between deformable bodies, nor with a vector that is no number.
     pub fn translate(&mut self, by: Vector) {
+        if !by.is_finite() {
+            return;
+        }
         self.changed = true;
         let by = crate::math::from_real(by);
         match &mut self.anchors {
@@ -148,6 +154,11 @@ impl DeformableAttachment {
         !self.broken && self.compliance == 0.0 && self.length == 0.0
     }
 
+    /// Takes in where its rigid body is now; true if that is not where it was.
+    pub(crate) fn notice(&mut self, pose: Option<Pose64>) -> bool {
+        std::mem::replace(&mut self.rigid_pose, pose) != pose
+    }
+
     /// The rigid body that it ties to.
     pub(crate) fn rigid(&self) -> Option<RigidBodyHandle> {
         match self.anchors {
@@ -158,8 +169,9 @@ impl DeformableAttachment {
 
     /// Takes in the force of a step.
     pub(crate) fn end_step(&mut self) {
-        if self.force.norm() > self.break_force {
+        if !self.broken && self.force.norm() > self.break_force {
             self.broken = true;
+            self.changed = true;
         }
     }
 }
@@ -170,7 +182,7 @@ impl DeformableBodySet {
     /// # Errors
     /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody); [`BodyError::NoSuchVertex`];
     /// [`BodyError::NotOnSurface`] for vertices inside of a body, which can be pinned but not attached;
-    /// [`BodyError::NoVertices`]; [`BodyError::WrongSize`] if the two lists of vertices differ in length.
+    /// [`BodyError::NoVertices`]; [`BodyError::NotFinite`] for a pose that is no number; [`BodyError::WrongSize`] if the two lists of vertices differ in length.
     pub fn attach(
         &mut self,
         body: DeformableBodyHandle,
@@ -182,6 +194,8 @@ impl DeformableBodySet {
         let anchors = match to {
             AttachTo::World => Anchors::World(nodes.iter().map(x).collect()),
             AttachTo::RigidBody(handle, pose) => {
+                super::body::finite("pose of the rigid body", pose.translation)?;
+                super::body::finite("rotation of the rigid body", pose.rotation.to_scaled_axis())?;
                 let pose = Pose64::from_real(&pose);
                 Anchors::Rigid(handle, nodes.iter().map(|n| pose.inverse_transform(&x(n))).collect())
             }
@@ -203,6 +217,7 @@ impl DeformableBodySet {
             force: Vec3::zeros(),
             broken: false,
             changed: true,
+            rigid_pose: None,
         };
         Ok(self.insert_attachment(attachment))
     }

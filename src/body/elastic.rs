@@ -36,14 +36,22 @@ pub(crate) struct StiffnessDamping {
 }
 
 impl StiffnessDamping {
-    /// Takes the stretches at `x`; `beta` \[s\], `h` \[s\].
-    pub fn begin(&mut self, model: &DeformableModel, beta: f64, h: f64, x: &[Vec3]) {
+    /// Takes the stretches at `x`, or what they and those `before` amount to in a step of the second order; `beta`
+    /// \[s\], `h` \[s\].
+    pub fn begin(&mut self, model: &DeformableModel, beta: f64, h: f64, x: &[Vec3], before: Option<&[Vec3]>) {
         self.ratio = beta / h;
         self.stretches.clear();
         if beta > 0.0 {
             push_stretches(model, x, &mut self.stretches);
+            if let Some(before) = before {
+                let mut last = Vec::new();
+                push_stretches(model, before, &mut last);
+                for (now, last) in self.stretches.iter_mut().zip(&last) {
+                    *now = now.plus_scaled(&now.minus(last), Lane::splat(1.0 / 3.0));
+                }
+            }
         }
-        self.thin.begin(&model.triangles, &model.stencils, beta, x);
+        self.thin.begin(&model.triangles, &model.stencils, beta, x, before);
     }
 }
 
@@ -314,6 +322,14 @@ fn transpose_mul(a: &LaneMat3, b: &LaneMat3) -> LaneMat3 {
     out
 }
 
+/// Gives nodes that no solid has the sums of the nearest node that one has: what is thin takes any frame alike,
+/// as long as its ends agree.
+fn copy_to_thin(model: &DeformableModel, sums: &mut [Mat3]) {
+    for &(node, solid) in &model.frame_sources {
+        sums[node as usize] = sums[solid as usize];
+    }
+}
+
 vectorized! {
 /// Replaces `frames` by the mean rotations of the elements around each node, weighted by volume.
 pub(crate) fn node_rotations[](model: &DeformableModel, x: &[Vec3], frames: &mut [Mat3]) {
@@ -327,6 +343,7 @@ pub(crate) fn node_rotations[](model: &DeformableModel, x: &[Vec3], frames: &mut
             }
         }
     }
+    copy_to_thin(model, frames);
     for chunk in frames.chunks_mut(LANES) {
         // Scaled to about one, four at a time; the last chunk repeats its last.
         let mut block = LaneMat3::default();
@@ -400,7 +417,7 @@ mod tests {
             let elasticity = if projective { Elasticity::Projective } else { Elasticity::LinearCorotated };
             let material = DeformableMaterial::new(1e3, 0.4).elasticity(elasticity);
             let mut damping = StiffnessDamping::default();
-            damping.begin(&model(), beta, 0.01, &shaken(seed ^ 1, 0.05));
+            damping.begin(&model(), beta, 0.01, &shaken(seed ^ 1, 0.05), None);
             let x = shaken(seed, 0.05);
             let direction: Vec<Vec3> = shaken(seed ^ 7, 1.0).iter().zip(&model().rest).map(|(a, b)| a - b).collect();
             let moved = |t: f64| -> Vec<Vec3> { x.iter().zip(&direction).map(|(p, d)| p + d * t).collect() };
@@ -419,7 +436,7 @@ mod tests {
             let model = model().smoothed();
             let elements = Elements { model: &model, material: &material, activation: 1.0 };
             let mut damping = StiffnessDamping::default();
-            damping.begin(&model, beta, 0.01, &shaken(seed ^ 1, 0.05));
+            damping.begin(&model, beta, 0.01, &shaken(seed ^ 1, 0.05), None);
             let at = |x: &[Vec3]| {
                 let mut f = vec![Vec3::zeros(); x.len()];
                 let elastic = add_forces(&elements, &damping, x, &Mat3::identity(), f64::INFINITY, &mut f);
@@ -443,7 +460,7 @@ mod tests {
         fn internal_forces_have_no_sum_and_no_moment(seed in any::<u64>()) {
             let material = DeformableMaterial::new(1e3, 0.3);
             let mut damping = StiffnessDamping::default();
-            damping.begin(&model(), 0.02, 0.01, &shaken(seed ^ 1, 0.05));
+            damping.begin(&model(), 0.02, 0.01, &shaken(seed ^ 1, 0.05), None);
             let x = shaken(seed, 0.05);
             let (_, f) = forces(&material, &damping, &x);
             let sum = f.iter().fold(Vec3::zeros(), |a, b| a + b);

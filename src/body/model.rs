@@ -35,6 +35,8 @@ pub struct DeformableModel {
     pub(crate) node_volumes: Vec<f64>,
     /// Nodes that share an element with each node, ascending, itself left out.
     pub(crate) adjacency: Vec<Vec<u32>>,
+    /// Nodes that belong to no tetrahedron, each with the nearest one that does.
+    pub(crate) frame_sources: Vec<(u32, u32)>,
     /// Nodes that each node has a block of the matrix with: as `adjacency`, unless smoothed.
     pub(crate) coupling: Vec<Vec<u32>>,
     /// The boundary.
@@ -138,6 +140,7 @@ impl DeformableModel {
         Self {
             id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
             blocks: solid.chunks(LANES).map(|c| ElementBlock::new(c, &rest)).collect(),
+            frame_sources: frame_sources(&adjacency, solid),
             coupling: adjacency.clone(),
             adjacency,
             volume,
@@ -210,7 +213,7 @@ impl DeformableModel {
         self.volume
     }
 
-    /// Vertices of the boundary triangles, wound outward.
+    /// Vertices of the triangles of the surface: those around tetrahedra first, wound outward, then those of sheets.
     pub fn surface_triangles(&self) -> impl ExactSizeIterator<Item = [u32; 3]> + '_ {
         let vertex = |n: u32| self.vertex_of_node[n as usize];
         self.surface.triangles.iter().map(move |t| t.map(vertex))
@@ -247,4 +250,26 @@ impl DeformableModel {
     pub(crate) fn nodes_by_vertex(&self) -> impl ExactSizeIterator<Item = usize> + '_ {
         self.node_of_vertex.iter().map(|&n| n as usize)
     }
+}
+
+/// Nodes without tetrahedra with the nearest, by edges, of those with some.
+fn frame_sources(adjacency: &[Vec<u32>], tetrahedra: &[[u32; 4]]) -> Vec<(u32, u32)> {
+    let mut source = vec![u32::MAX; adjacency.len()];
+    tetrahedra.iter().flatten().for_each(|&n| source[n as usize] = n);
+    let mut front: Vec<u32> = (0..source.len() as u32).filter(|&n| source[n as usize] == n).collect();
+    let mut found = Vec::new();
+    while !front.is_empty() {
+        let mut next = Vec::new();
+        for &n in &front {
+            for &other in &adjacency[n as usize] {
+                if source[other as usize] == u32::MAX {
+                    source[other as usize] = source[n as usize];
+                    found.push((other, source[n as usize]));
+                    next.push(other);
+                }
+            }
+        }
+        front = next;
+    }
+    found
 }

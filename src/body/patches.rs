@@ -72,7 +72,7 @@ impl Patches {
         }
         let mut all: Vec<Patch> = by_name.into_values().collect();
         // Equal numbers of nodes side by side; among those, neighbours in memory.
-        all.sort_by_key(|p| (p.gradients.len(), p.gradients.keys().sum::<u32>()));
+        all.sort_by_key(|p| (p.gradients.len(), p.gradients.keys().map(|n| u64::from(*n)).sum::<u64>()));
         let mut patches = Self { starts: vec![0], count: all.len(), ..Self::default() };
         for block in all.chunks(LANES) {
             let count = block.iter().map(|p| p.gradients.len()).max().unwrap_or(0);
@@ -85,8 +85,9 @@ impl Patches {
                     volumes.0[i] = patch.volume;
                 }
                 let last = patch.gradients.keys().next_back().copied().unwrap_or(0);
-                for (k, corner) in corners.iter_mut().enumerate() {
-                    let own = patch.gradients.iter().nth(k);
+                let mut gradients = patch.gradients.iter();
+                for corner in &mut corners {
+                    let own = gradients.next();
                     corner.nodes[i] = own.map_or(last, |(n, _)| *n);
                     for c in 0..3 {
                         corner.gradient[c].0[i] = own.map_or(0.0, |(_, g)| g[c] / patch.volume);

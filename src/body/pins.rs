@@ -20,6 +20,7 @@ impl DeformableBody {
     /// [`BodyError::NoSuchVertex`].
     pub fn pin(&mut self, vertex: usize) -> Result<(), BodyError> {
         self.wake_up();
+        self.state.history.clear();
         let node = self.node(vertex)?;
         let pin = Pin { node: node as u32, target: self.state.x[node], force: Vec3::zeros() };
         match self.pin_place(node) {
@@ -35,6 +36,7 @@ impl DeformableBody {
     /// [`BodyError::NoSuchVertex`], [`BodyError::NotPinned`].
     pub fn unpin(&mut self, vertex: usize) -> Result<(), BodyError> {
         self.wake_up();
+        self.state.history.clear();
         let node = self.node(vertex)?;
         let place = self.pin_place(node);
         self.pins.remove(place.map_err(|_| BodyError::NotPinned { vertex })?);

@@ -62,8 +62,8 @@ pub enum Integrator {
     ImplicitEuler,
     /// The backward differentiation formula of second order, `x = (4xₙ − xₙ₋₁)/3 + 2h/3·v` [Hairer & Wanner
     /// 1996], with a constant matrix of its own. Keeps vibrations that implicit Euler damps out. A body that
-    /// touches something, is tied to something, or was moved by its user takes steps of implicit Euler
-    /// until it has been free for one.
+    /// touches something, is tied to something, or was moved, pinned or let go by its user takes steps of
+    /// implicit Euler until it has been free for one. Pins may stay, and be led.
     Bdf2,
 }
 
@@ -121,7 +121,7 @@ impl Default for Acceleration {
 #[non_exhaustive]
 pub enum Fidelity {
     /// One iteration of the [`SystemMatrix::Laplacian`], with eight clusters: the smallest factors, the fewest
-    /// solves, and motion that looks right.
+    /// solves, and motion that looks right; of ropes one iteration of Newton's method.
     Preview,
     /// The defaults, at three times their tolerance.
     Game,

@@ -63,7 +63,12 @@ impl ThinElements {
                 thin.stencils.push(bar);
                 thin.segments.push(ends);
             }
-            for bend in points.windows(3).filter(|p| p[0] != p[2]) {
+            let mut bends = points.clone();
+            if points.len() > 3 && points.first() == points.last() {
+                // A ring bends where it closes too.
+                bends.push(points[1]);
+            }
+            for bend in bends.windows(3).filter(|p| p[0] != p[2]) {
                 thin.stencils.push(Stencil::rod_bend([bend[0], bend[1], bend[2]], rod.radius, rest));
             }
         }
@@ -112,16 +117,31 @@ pub(crate) struct ThinDamping {
 }
 
 impl ThinDamping {
-    pub fn begin(&mut self, triangles: &[TriangleElement], stencils: &[Stencil], beta: f64, x: &[Vec3]) {
+    /// At `x`, or what that and `before` amount to in a step of the second order.
+    pub fn begin(
+        &mut self,
+        triangles: &[TriangleElement],
+        stencils: &[Stencil],
+        beta: f64,
+        x: &[Vec3],
+        before: Option<&[Vec3]>,
+    ) {
         self.stretches.clear();
         self.lengths.clear();
         if beta > 0.0 {
-            self.stretches.extend(triangles.iter().map(|t| {
+            let stretch = |t: &TriangleElement, x: &[Vec3]| {
                 let F = t.deformation_gradient(x);
                 let S = polar_factor(&F).tr_mul(&F);
                 (S + S.transpose()) * 0.5
+            };
+            self.stretches.extend(triangles.iter().map(|t| {
+                let now = stretch(t, x);
+                before.map_or(now, |before| now + (now - stretch(t, before)) / 3.0)
             }));
-            self.lengths.extend(stencils.iter().map(|s| s.vector(x).norm()));
+            self.lengths.extend(stencils.iter().map(|s| {
+                let now = s.vector(x).norm();
+                before.map_or(now, |before| now + (now - s.vector(before).norm()) / 3.0)
+            }));
         }
     }
 }

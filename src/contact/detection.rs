@@ -152,7 +152,14 @@ impl Detector {
             }
             let to_local = |v: &Vec3| scene.obstacle.start.rotation.tr_mul(v);
             let outward = if surface.is_thin[s] {
-                side_of_node(scene.obstacle, nodes[s], &p, &to_local(&self.motions[s]), memory)
+                side_of_node(
+                    scene.obstacle,
+                    nodes[s],
+                    &p,
+                    &to_local(&self.motions[s]),
+                    memory,
+                    scene.scales.band,
+                )
             } else {
                 to_local(&self.normals[s])
             };
@@ -181,7 +188,7 @@ impl Detector {
                 }
                 let [a, b] = [self.local[ends[inner]], self.local[ends[outer]]];
                 let mut outward = self.edge_normal(surface, e);
-                if surface.is_thin[ends[0]] && surface.is_thin[ends[1]] {
+                if surface.is_thin_edge(e) {
                     outward = -on_face.normal;
                 }
                 let crossing = rim_crossing(scene.obstacle, &on_face, &a, &b, &outward, &scene.scales);
@@ -257,7 +264,7 @@ impl Detector {
             let [a, b, c] = s.map(|s| self.local[s]);
             let p = a * weights[0] + b * weights[1] + c * weights[2];
             let mut outward = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
-            if s.iter().any(|&s| surface.is_thin[s]) {
+            if outward == Vec3::zeros() || s.iter().any(|&s| surface.is_thin[s]) {
                 outward = -scene.obstacle.start.rotation.tr_mul(&kept.geometry.frame[0]);
             }
             let reach = s.iter().fold(0.0, |a: f64, &s| a.max(self.reach[s])) + scene.motion;
@@ -320,9 +327,12 @@ impl Detector {
                 continue;
             }
             let feature = scene.edge_feature(e);
+            let skin =
+                surface.edges[e].iter().map(|&n| scene.model.half_thickness[n as usize]).fold(0.0, f64::max);
             let points = self.points.iter().filter(|p| p.0 == feature).map(|p| &p.2);
             let known = s.iter().filter_map(|&s| self.nodes[s].as_ref()).chain(&self.edges[e]).chain(points);
-            if let Some((t, found)) = segment_point(scene.obstacle, &ends, known, reach, &scene.scales) {
+            if let Some((t, found)) = segment_point(scene.obstacle, &ends, known, reach, skin, &scene.scales)
+            {
                 let [a, b] = surface.edges[e];
                 let mut row = scene.row([a, b, a], [1.0 - t, t, 0.0], &found, feature);
                 row.key.slot = self.free_slot(feature);

@@ -83,6 +83,12 @@ pub(crate) fn surface_point(
     }
 }
 
+/// Unit direction from `p` to the nearest point of the obstacle's surface, if that is farther than `band` \[m\].
+pub(crate) fn towards_surface(obstacle: &Obstacle, p: &Vec3, band: f64) -> Option<Vec3> {
+    let hit = project(obstacle, p)?;
+    (hit.point - p).try_normalize(band)
+}
+
 /// Whether the point of the face's plane below `p` belongs to the face: whether the face of
 /// `on_face` is what `p`, lifted off its plane, projects onto.
 pub(crate) fn is_over_face(obstacle: &Obstacle, on_face: &SurfacePoint, p: &Vec3, scales: &Scales) -> bool {

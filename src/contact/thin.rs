@@ -1,8 +1,8 @@
 //! Sides of what has no inside: sheets and rods. Which way is out is decided against each obstacle: away from
 //! the body, towards what it may touch.
 
-use super::obstacle::Obstacle;
-use super::surface_point::{Scales, SurfacePoint};
+use super::obstacle::{Obstacle, Solidity};
+use super::surface_point::{Scales, SurfacePoint, towards_surface};
 use crate::body::ContactMemory;
 use crate::math::{Vec3, from_real, to_real};
 use parry3d::math::Pose;
@@ -11,21 +11,32 @@ use parry3d::shape::Segment;
 
 /// Nearer to an end than this part of a segment the end's own row serves.
 const AT_END: f64 = 1.0e-3;
+/// Part of a rod's radius within which its distance has no direction.
+const NEAREST: f64 = 0.1;
 /// Cosine beyond which two rows push the same way.
 const PARALLEL: f64 = 0.9;
 
 /// The side of a node at `p` that looks at the obstacle, in the obstacle's frame: against the normal that
-/// carried it in the last step, else the way it goes (`motion`), else towards the obstacle's middle.
+/// carried it in the last step; else of a sheet where it is, unless that is within `band` \[m\] of it; else the way it
+/// goes (`motion`), else towards the obstacle's middle.
 pub(crate) fn side_of_node(
     obstacle: &Obstacle,
     node: u32,
     p: &Vec3,
     motion: &Vec3,
     memory: &[ContactMemory],
+    band: f64,
 ) -> Vec3 {
-    let carried = memory.iter().find(|m| m.key.feature == node);
+    let own = |m: &&ContactMemory| m.key.feature == node && !m.key.is_between() && !m.key.is_link();
+    let carried = memory.iter().find(own);
     if let Some(carried) = carried {
         return -obstacle.start.rotation.tr_mul(&carried.geometry.frame[0]);
+    }
+    // What has no inside either is on the side where it is.
+    if obstacle.solidity() == Solidity::Sheet
+        && let Some(towards) = towards_surface(obstacle, p, band)
+    {
+        return towards;
     }
     let towards = from_real(obstacle.shape.compute_local_aabb().center()) - p;
     motion.try_normalize(1e-12).or_else(|| towards.try_normalize(0.0)).unwrap_or_else(|| -Vec3::y())
@@ -55,6 +66,7 @@ pub(crate) fn segment_point<'a>(
     [a, b]: &[Vec3; 2],
     known: impl Iterator<Item = &'a SurfacePoint>,
     reach: f64,
+    skin: f64,
     scales: &Scales,
 ) -> Option<(f64, SurfacePoint)> {
     let identity = Pose::IDENTITY;
@@ -64,7 +76,8 @@ pub(crate) fn segment_point<'a>(
         return None;
     };
     let (on_segment, point) = (from_real(on_segment), from_real(on_obstacle));
-    let normal = (on_segment - point).try_normalize(scales.band)?;
+    // Long thin ropes touch nearer than the band of their length.
+    let normal = (on_segment - point).try_normalize(scales.band.min(NEAREST * skin))?;
     let along = b - a;
     let t = along.dot(&(on_segment - a)) / along.norm_squared();
     if !(AT_END..1.0 - AT_END).contains(&t) {

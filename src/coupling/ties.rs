@@ -4,8 +4,8 @@
 use super::obstacles::RapierScene;
 use super::parts::RapierSets;
 use crate::body::{
-    Anchors, ContactKey, DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet,
-    FIRST_LINK_SLOT, Hold,
+    Anchors, ContactKey, DeformableAttachment, DeformableAttachmentHandle, DeformableBodyHandle,
+    DeformableBodySet, FIRST_LINK_SLOT, Hold,
 };
 use crate::contact::{Law, Row, Side};
 use crate::math::{Pose64, Vec3};
@@ -23,30 +23,37 @@ pub(crate) fn attachment_of(key: &ContactKey) -> Option<u64> {
 }
 
 /// Appends the nodes that hard attachments to the world, and to bodies that do not yield, hold, each with the body
-/// that it is of.
+/// that it is of; `fastest` \[m\] is how far a node that is not where it belongs is brought back in the step.
 pub(crate) fn held_nodes(
     deformables: &DeformableBodySet,
     scene: &mut RapierScene,
     sets: RapierSets<'_>,
     gravity: Vector,
     dt: f64,
+    fastest: f64,
     held: &mut Vec<(DeformableBodyHandle, Hold)>,
 ) {
     for (handle, attachment) in deformables.attachments().filter(|(_, a)| a.is_hard()) {
-        let mut hold = |node: u32, target: Vec3| {
+        let Some(body) = deformables.get(attachment.body()) else { continue };
+        // From where the anchor is, to where it will be; what is off is brought back at a bounded speed.
+        let mut hold = |node: u32, start: Vec3, end: Vec3| {
+            let off = body.state.x[node as usize] - start;
+            let target = end + off * (1.0 - (fastest / off.norm()).min(1.0));
+            let target = if off == Vec3::zeros() { end } else { target };
             held.push((attachment.body(), Hold { node, target, attachment: handle }));
         };
         match &attachment.anchors {
             Anchors::World(points) => {
-                attachment.nodes.iter().zip(points).for_each(|(node, point)| hold(*node, *point));
+                attachment.nodes.iter().zip(points).for_each(|(node, point)| hold(*node, *point, *point));
             }
             Anchors::Rigid(rigid, points) => {
                 let partner = scene.body_partner(sets, *rigid, gravity, dt);
-                let Some(end) = partner.and_then(|id| scene.partners.get(id).prescribed_end()) else {
+                let Some([start, end]) = partner.and_then(|id| scene.partners.get(id).prescribed()) else {
                     continue;
                 };
-                let points = points.iter().map(|point| end.transform(point));
-                attachment.nodes.iter().zip(points).for_each(|(node, point)| hold(*node, point));
+                for (node, point) in attachment.nodes.iter().zip(points) {
+                    hold(*node, start.transform(point), end.transform(point));
+                }
             }
             Anchors::Deformable(..) => {}
         }
@@ -65,7 +72,8 @@ pub(crate) fn tie_rows(
     is_held: impl Fn(usize, u32, DeformableAttachmentHandle) -> bool,
     rows: &mut Vec<Row>,
 ) {
-    for (handle, attachment) in deformables.attachments().filter(|(_, a)| !a.is_broken()) {
+    let holds = |a: &DeformableAttachment| !a.is_broken() && a.compliance() < f64::INFINITY;
+    for (handle, attachment) in deformables.attachments().filter(|(_, a)| holds(a)) {
         let (Some(own), Some(body)) = (index_of(attachment.body()), deformables.get(attachment.body()))
         else {
             continue;
@@ -108,7 +116,9 @@ pub(crate) fn tie_rows(
                 row.compliance = attachment.compliance();
                 // A cable that is drawn aside pulls back with its tension over its length. Left to the next
                 // step, that throws about whatever is lighter than h² times as much.
-                let last = deformables.iter().find_map(|(_, b)| b.state.closure_row(&key(CABLE)));
+                // Kept with the first body of the island, which is being stepped.
+                let stepped = deformables.iter().filter(|(handle, _)| index_of(*handle).is_some());
+                let last = stepped.into_iter().find_map(|(_, b)| b.state.closure_row(&key(CABLE)));
                 let tension = last.map_or(0.0, |memory| memory.force.norm());
                 if tension > 0.0 {
                     for (axis, feature) in [(row.frame[1], CABLE + 1), (row.frame[2], CABLE + 2)] {

@@ -32,6 +32,21 @@ pub(crate) fn to_real(v: &Vec3) -> Vector {
     Vector::new(v.x as f32, v.y as f32, v.z as f32)
 }
 
+/// `S⁻¹ b` for a symmetric positive semi-definite S, without the axes about which it has next to nothing: those of an
+/// inertia of points in a line.
+pub(crate) fn solve_semidefinite(S: &Mat3, b: &Vec3) -> Vec3 {
+    let eigen = S.symmetric_eigen();
+    let least = 1.0e-9 * eigen.eigenvalues.max();
+    let mut out = Vec3::zeros();
+    for k in 0..3 {
+        let axis: Vec3 = eigen.eigenvectors.column(k).into();
+        if eigen.eigenvalues[k] > least {
+            out += axis * (axis.dot(b) / eigen.eigenvalues[k]);
+        }
+    }
+    out
+}
+
 /// The matrix of `v ↦ a × v`.
 pub(crate) fn skew(a: &Vec3) -> Mat3 {
     Mat3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)

@@ -66,7 +66,8 @@ impl Structure {
         Self { is_network: true, ..Self::solid(mesh) }
     }
 
-    /// A sheet of triangles, `thickness` \[m\]: cloth, paper, shells.
+    /// A sheet of triangles, `thickness` \[m\]: cloth, paper, shells. A hinge keeps the angle by which it is bent at rest,
+    /// to either side.
     ///
     /// # Errors
     /// What is wrong with the triangles or the thickness.
@@ -158,6 +159,12 @@ impl Structure {
         }
         self.sheets.extend(triangles.iter().map(|&corners| SheetTriangle { corners, thickness }));
         let all: Vec<[u32; 3]> = self.sheets.iter().map(|t| t.corners).collect();
+        let mut sorted: Vec<([u32; 3], usize)> = all.iter().copied().zip(0..).collect();
+        sorted.iter_mut().for_each(|(t, _)| t.sort_unstable());
+        sorted.sort_unstable();
+        if let Some(pair) = sorted.windows(2).find(|p| p[0].0 == p[1].0) {
+            return Err(MeshError::RepeatedTriangle { triangle: pair[1].1, vertices: pair[1].0 });
+        }
         for used in super::surface::edge_uses(&all) {
             if used.count > 2 {
                 return Err(MeshError::NonManifoldEdge { edge: used.edge, count: used.count });
@@ -175,8 +182,9 @@ impl Structure {
         if points.len() < 2 {
             return Err(MeshError::Empty);
         }
+        let size = self.size();
         for ends in points.windows(2) {
-            self.check_ends([ends[0], ends[1]])?;
+            self.check_ends([ends[0], ends[1]], size)?;
         }
         self.rods.push(Rod { points, radius });
         Ok(self)
@@ -189,6 +197,10 @@ impl Structure {
     pub fn rod_from(mut self, start: u32, points: &[[f64; 3]], radius: f64) -> Result<Self, MeshError> {
         check_vertices(points)?;
         let first = self.vertices.len() as u32;
+        if start >= first {
+            let (ends, vertices) = ([start, first], self.vertices.len());
+            return Err(MeshError::EndOutOfRange { ends, vertex: start, vertices });
+        }
         self.vertices.extend_from_slice(points);
         let along = std::iter::once(start).chain(first..self.vertices.len() as u32);
         self.with_rod(along.collect(), radius)
@@ -200,7 +212,7 @@ impl Structure {
     /// Ends that are no vertices or in one place, a bad area.
     pub fn with_spring(mut self, ends: [u32; 2], area: f64) -> Result<Self, MeshError> {
         check_size("cross-section", area)?;
-        self.check_ends(ends)?;
+        self.check_ends(ends, self.size())?;
         self.springs.push(Spring { ends, area });
         Ok(self)
     }
@@ -226,14 +238,21 @@ impl Structure {
         }
     }
 
-    fn check_ends(&self, ends: [u32; 2]) -> Result<(), MeshError> {
+    /// Extent of the vertices \[m\].
+    fn size(&self) -> f64 {
+        let all = self.vertices.iter().map(|v| Vec3::from(*v));
+        let low = all.clone().fold(Vec3::repeat(f64::INFINITY), |a, b| a.inf(&b));
+        let high = all.fold(Vec3::repeat(f64::NEG_INFINITY), |a, b| a.sup(&b));
+        (high - low).norm()
+    }
+
+    fn check_ends(&self, ends: [u32; 2], size: f64) -> Result<(), MeshError> {
         let vertices = self.vertices.len();
         if let Some(&vertex) = ends.iter().find(|&&v| v as usize >= vertices) {
             return Err(MeshError::EndOutOfRange { ends, vertex, vertices });
         }
         let [a, b] = ends.map(|v| Vec3::from(self.vertices[v as usize]));
         let length = (b - a).norm();
-        let size = self.vertices.iter().fold(0.0, |s: f64, v| s.max((Vec3::from(*v) - a).norm()));
         match length > SHORT * size {
             true => Ok(()),
             false => Err(MeshError::ShortEdge { ends, length }),
@@ -282,8 +301,14 @@ mod tests {
             sheet(&[[0, 1, 2], [0, 2, 2]]),
             MeshError::RepeatedInTriangle { triangle: 1, vertex: 2 }
         ));
-        let fan = sheet(&[[0, 1, 2], [0, 2, 3], [0, 2, 1]]);
+        let mut book = square();
+        book.push([0.5, 1.0, 0.5]);
+        let fan = Structure::sheet(book, &[[0, 1, 2], [0, 2, 3], [0, 2, 4]], 0.01).unwrap_err();
         assert!(matches!(fan, MeshError::NonManifoldEdge { count: 2.., .. }));
+        assert!(matches!(
+            sheet(&[[0, 1, 2], [1, 2, 0]]),
+            MeshError::RepeatedTriangle { triangle: 1, vertices: [0, 1, 2] }
+        ));
         let line = vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
         let flat = Structure::sheet(line.clone(), &[[0, 1, 2]], 0.01);
         assert!(matches!(flat, Err(MeshError::FlatTriangle { triangle: 0, .. })));
@@ -301,6 +326,8 @@ mod tests {
             rod.clone().with_spring([0, 9], 1.0),
             Err(MeshError::EndOutOfRange { vertex: 9, .. })
         ));
+        let beyond = rod.clone().rod_from(3, &[[3.0, 0.0, 0.0], [4.0, 0.0, 0.0]], 0.1);
+        assert!(matches!(beyond, Err(MeshError::EndOutOfRange { vertex: 3, .. })));
         let alone = Structure { vertices: vec![[0.0; 3]; 4], ..rod };
         assert_eq!(alone.check(), Err(MeshError::UnusedVertex { vertex: 3 }));
         assert_eq!(Structure::default().check(), Err(MeshError::Empty));

@@ -62,7 +62,10 @@ impl Surface {
         for (t, of_triangle) in triangle_edges.iter().enumerate() {
             for &e in of_triangle {
                 let pair = &mut edge_triangles[e as usize];
-                pair[usize::from(pair[0] != NONE)] = t as u32;
+                // Where a sheet is sewn to a solid, the solid's own two stay.
+                if let Some(place) = pair.iter().position(|t| *t == NONE) {
+                    pair[place] = t as u32;
+                }
             }
         }
         let alone = (0..edges.len()).filter(|&e| edge_triangles[e][0] == NONE);
@@ -124,7 +127,9 @@ impl Surface {
 
     /// Whether all of it bounds solids.
     pub fn is_closed(&self) -> bool {
-        !self.is_thin.iter().any(|thin| *thin) && self.closed == self.triangles.len()
+        !self.is_thin.iter().any(|thin| *thin)
+            && self.closed == self.triangles.len()
+            && self.segments.is_empty()
     }
 }
 

@@ -59,6 +59,14 @@ pub enum MeshError {
         /// The repeated vertex.
         vertex: u32,
     },
+    /// A triangle is in a sheet twice.
+    #[error("triangle {triangle} is there twice: {vertices:?}")]
+    RepeatedTriangle {
+        /// Index of the second one.
+        triangle: usize,
+        /// Its vertices, ascending.
+        vertices: [u32; 3],
+    },
     /// A triangle of a sheet without area to speak of.
     #[error("triangle {triangle} is flat (area {area:e} m² with a longest edge of {edge:e} m)")]
     FlatTriangle {

@@ -92,7 +92,8 @@ impl DeformablePipeline {
         let mut clock = Clock::start();
         self.read_obstacles(sets, gravity, h);
         self.wake(deformables, sets, gravity, h);
-        self.predict(deformables, sets, gravity, h);
+        let recovery = parameters.contact_limits().recovery_speed * h;
+        self.predict(deformables, sets, gravity, h, recovery);
         self.detect(deformables, sets, 0);
         self.meet(deformables, sets, gravity, h);
         // What touches a sleeping body goes on to do so.
@@ -183,6 +184,7 @@ impl DeformablePipeline {
         sets: RapierSets<'_>,
         gravity: Vector,
         h: f64,
+        recovery: f64,
     ) {
         for (handle, body) in deformables.iter_mut() {
             if !body.is_enabled() {
@@ -202,7 +204,7 @@ impl DeformablePipeline {
             self.take_up(handle);
         }
         self.held.clear();
-        held_nodes(deformables, &mut self.scene, sets, gravity, h, &mut self.held);
+        held_nodes(deformables, &mut self.scene, sets, gravity, h, recovery, &mut self.held);
         self.hold(0);
         let (set, gravity) = (&*deformables, from_real(gravity));
         for_each(&mut self.works, |work| work.predict(&set[work.handle], h, &gravity));
@@ -320,6 +322,15 @@ impl DeformablePipeline {
         let index_of = |handle: DeformableBodyHandle| works.iter().position(|w| w.handle == handle);
         let is_held = |place: usize, node, by| works[place].is_held(node, by);
         tie_rows(deformables, &mut self.scene, sets, gravity, h, index_of, is_held, &mut self.ties);
+        // Between nodes that are held and what does not yield there is nothing to solve for.
+        let partners = &self.scene.partners;
+        self.ties.retain(|row| {
+            let stays = |side: &Side| match side {
+                Side::Soft { body, .. } => works[*body].holds_all(side),
+                Side::Partner { partner, .. } | Side::Turn { partner } => !partners.yields(*partner),
+            };
+            !row.sides.iter().all(stays)
+        });
         for side in self.ties.iter().flat_map(|row| &row.sides) {
             if let Side::Soft { body, .. } = side {
                 self.works[*body].tied.extend(side.soft_nodes().map(|(node, _)| node as u32));

@@ -4,8 +4,8 @@ use super::work::IslandWork;
 use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Surroundings, TIME_UNTIL_SLEEP};
 use crate::contact::Candidates;
 use crate::coupling::{RapierScene, RapierSets};
-use crate::math::Vec3;
-use rapier3d::dynamics::RigidBodyHandle;
+use crate::math::{Pose64, Vec3};
+use rapier3d::dynamics::{RigidBody, RigidBodyHandle};
 
 /// Memory for looking around.
 #[derive(Default)]
@@ -23,8 +23,17 @@ impl Sleeping {
         self.wake.clear();
         for attachment in deformables.attachments_mut() {
             self.wake.extend(attachment.take_changed().into_iter().flatten());
+            if attachment.is_broken() || attachment.rigid().is_none() {
+                continue;
+            }
             let rigid = attachment.rigid().and_then(|handle| sets.bodies.get(handle));
-            if rigid.is_some_and(|body| body.is_moving() && !body.is_sleeping()) {
+            // Moved by its user, or gone.
+            let moved = attachment.notice(rigid.map(|body| Pose64::from_real(body.position())));
+            let moves = |body: &RigidBody| {
+                let led = body.is_kinematic() && body.next_position() != body.position();
+                led || body.is_moving() && !body.is_sleeping()
+            };
+            if moved || rigid.is_some_and(moves) {
                 self.wake.push(attachment.body());
             }
         }

@@ -196,7 +196,7 @@ impl BodyWork {
 
     /// Whether anything may touch the body in this step, or holds it.
     pub fn is_touched(&self) -> bool {
-        !(self.rows.is_empty() && self.tied.is_empty())
+        !(self.rows.is_empty() && self.tied.is_empty() && self.holds.is_empty())
     }
 
     /// Tells where the body's factor is kept in this step.

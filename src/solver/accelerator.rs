@@ -39,8 +39,11 @@ impl Accelerator {
 
     /// Takes in the step from the current iterate to the trial.
     pub fn learn(&mut self, kind: Acceleration, body: &BodyProblem) {
-        if let Acceleration::Lbfgs { .. } = kind {
-            self.lbfgs.learn(body);
+        match kind {
+            Acceleration::None => {}
+            Acceleration::Lbfgs { .. } => self.lbfgs.learn(body),
+            Acceleration::Anderson { window } => self.anderson.learn(window, body),
+            Acceleration::Chebyshev { .. } => self.chebyshev.learn(body),
         }
     }
 }

@@ -11,7 +11,7 @@ use super::system::FactorKey;
 use crate::body::elastic::{self, Elements, StiffnessDamping};
 use crate::body::{DeformableBody, DeformableModel, Hold, Integrator, SolverSettings};
 use crate::material::DeformableMaterial;
-use crate::math::{Mat3, Vec3, rotation_from_vector, skew};
+use crate::math::{Mat3, Vec3, rotation_from_vector, skew, solve_semidefinite};
 use std::sync::Arc;
 
 /// Error of the body's frame \[rad\] beyond which it is refreshed within a step.
@@ -181,7 +181,8 @@ impl BodyProblem {
         self.contact_force.clear();
         self.contact_force.resize(n, Vec3::zeros());
         self.step.resize(n, Vec3::zeros());
-        self.damping.begin(&self.model, self.material.stiffness_damping, h, &self.x_start);
+        let before = self.is_second_order.then_some(&body.state.history.x[..]);
+        self.damping.begin(&self.model, self.material.stiffness_damping, h, &body.state.x, before);
         let mass = self.masses.iter().sum::<f64>();
         self.weight = mass * g.norm() / n as f64;
     }
@@ -237,9 +238,7 @@ impl BodyProblem {
             moment += r.cross(&(y - moved_to - r)) * *m;
             inertia += (Mat3::identity() * r.norm_squared() - r * r.transpose()) * *m;
         }
-        let Some(omega) = inertia.try_inverse().map(|inverse| inverse * moment) else {
-            return false;
-        };
+        let omega = solve_semidefinite(&inertia, &moment);
         // Below this the stretch is 5e-9.
         if !(omega.norm() > FRAME_ERROR) {
             return false;

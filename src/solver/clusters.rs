@@ -16,8 +16,10 @@ use nalgebra::{DMatrix, DVector};
 
 /// The constant part, kept with a factor.
 pub(crate) struct Clusters {
-    /// Per cluster, per node.
+    /// Per cluster, per node; without the pinned ones.
     Y: Vec<Vec<Vec3>>,
+    /// With them, as where a cluster is does not turn it.
+    moments: Vec<Vec<Vec3>>,
     Z: Vec<Vec<Vec3>>,
     /// `Σ_i Y_c,i Z_d,iᵀ`, by columns of clusters.
     products: Vec<Mat3>,
@@ -61,6 +63,7 @@ impl Clusters {
             T[c] += 2.0 * weight * volume;
             corners.iter().for_each(|(n, g)| Y[c][*n as usize] += g * (weight * volume));
         }
+        let moments = Y.clone();
         // Pinned nodes are no unknowns.
         Y.iter_mut().for_each(|y| pins.iter().for_each(|&p| y[p as usize] = Vec3::zeros()));
         let mut columns: Vec<f64> = Vec::new();
@@ -79,11 +82,11 @@ impl Clusters {
             Y[c].iter().zip(&Z[d]).fold(Mat3::zeros(), |sum, (y, z)| sum + y * z.transpose())
         };
         let products = (0..count * count).map(|k| product(k % count, k / count)).collect();
-        Self { Y, Z, products, T }
+        Self { Y, moments, Z, products, T }
     }
 
     pub fn bytes(&self) -> usize {
-        (self.Y.len() + self.Z.len()) * self.Y.first().map_or(0, |y| size_of_val(&y[..]))
+        (2 * self.Y.len() + self.Z.len()) * self.Y.first().map_or(0, |y| size_of_val(&y[..]))
     }
 }
 
@@ -106,7 +109,7 @@ impl TurnedClusters {
     pub fn turn(&mut self, clusters: &Clusters, x: &[Vec3]) -> bool {
         let count = clusters.Y.len();
         self.frames.clear();
-        for y in &clusters.Y {
+        for y in &clusters.moments {
             let moment = x.iter().zip(y).fold(Mat3::zeros(), |sum, (x, y)| sum + x * y.transpose());
             self.frames.push(polar_rotation(&moment));
         }

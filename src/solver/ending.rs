@@ -1,7 +1,7 @@
 //! What is put right at the end of a body's step, and read off it.
 
 use super::body_problem::BodyProblem;
-use crate::math::{Mat3, Vec3, rotation_from_vector};
+use crate::math::{Mat3, Vec3, rotation_from_vector, solve_semidefinite};
 
 /// Largest turn \[rad\] that [`BodyProblem::balance`] takes for the rest of an iteration.
 const MAX_BALANCING_TURN: f64 = 0.1;
@@ -24,12 +24,8 @@ impl BodyProblem {
             moment += arm.cross(r);
             inertia += (Mat3::identity() * arm.norm_squared() - arm * arm.transpose()) * *m;
         }
-        let Some(turn) = inertia.try_inverse().map(|inverse| inverse * moment * mobility) else {
-            return;
-        };
-        if !(turn.norm() < MAX_BALANCING_TURN) {
-            return;
-        }
+        let turn = solve_semidefinite(&inertia, &moment) * mobility;
+        let turn = if turn.norm() < MAX_BALANCING_TURN { turn } else { Vec3::zeros() };
         let (rotation, shift) = (rotation_from_vector(&turn), force * (mobility / total));
         x.iter_mut().for_each(|x| *x = centre + shift + rotation * (*x - centre));
     }
@@ -58,8 +54,7 @@ impl BodyProblem {
         }
         let drag = 1.0 + self.material.mass_damping * self.dt;
         let missing = (self.spin + gained) / drag - lost;
-        let Some(turn) = inertia.try_inverse().map(|inverse| inverse * missing) else { return };
-        // What has no width about some axis has no spin about it, but for roundings.
+        let turn = solve_semidefinite(&inertia, &missing);
         if turn.norm() * self.h < MAX_SPIN_GIVEN {
             for (v, x) in v.iter_mut().zip(&self.current.x) {
                 *v += turn.cross(&(x - centre));

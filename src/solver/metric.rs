@@ -102,7 +102,8 @@ impl Metric {
                 let d = &mut self.deflation;
                 d.coupling.iter_mut().for_each(|g| *g = turn * *g * turn.transpose());
                 d.mean = turn * d.mean * turn.transpose();
-                d.made_from.1 = vec![self.floating];
+                // Turned numbers are not those that a fresh solve would give.
+                d.made_from.0 = None;
                 d.active = true;
             }
         }

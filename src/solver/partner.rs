@@ -86,10 +86,10 @@ impl Partner {
         }
     }
 
-    /// Where a body that does not yield is at the end of the step.
-    pub fn prescribed_end(&self) -> Option<Pose64> {
+    /// Where a body that does not yield is at the start and at the end of the step.
+    pub fn prescribed(&self) -> Option<[Pose64; 2]> {
         match self {
-            Self::Prescribed { end, .. } => Some(*end),
+            Self::Prescribed { start, end } => Some([*start, *end]),
             Self::Rigid { .. } | Self::Link { .. } => None,
         }
     }
