@@ -90,6 +90,8 @@ pub(crate) struct Elastic {
     pub energy: f64,
     /// Least `tr(QᵀR)` over the elements, `1 + 2 cos θ` of the largest turn θ against the frame Q.
     pub least_trace: f64,
+    /// Elements that were computed.
+    pub evaluated: usize,
 }
 
 /// Adds the elastic (and damping) forces \[N\] at positions `x` to `force`; `frame` is what the turn of
@@ -112,6 +114,7 @@ pub(crate) fn add_forces(
         })
     };
     if !(model.triangles.is_empty() && model.stencils.is_empty()) {
+        elastic.evaluated += model.triangles.len() + model.stencils.len();
         elastic.energy += thin::add_forces(elements, &damping.thin, damping.ratio, x, force);
     }
     elastic
@@ -153,14 +156,15 @@ fn sum_elements[E: ElementEnergy](
             *F = response.stress;
         }
         if total.sum() > limit {
-            return Elastic { energy: f64::INFINITY, least_trace: 3.0 };
+            let evaluated = (stage * STAGE + blocks.len()) * LANES;
+            return Elastic { energy: f64::INFINITY, least_trace: 3.0, evaluated };
         }
         for (stress, block) in buffer.iter().zip(blocks) {
             scatter_forces(block, stress, force);
         }
     }
     let least_trace = least_trace.0.into_iter().fold(3.0, f64::min);
-    Elastic { energy: total.sum(), least_trace }
+    Elastic { energy: total.sum(), least_trace, evaluated: model.tetrahedra.len() }
 }
 }
 
@@ -185,6 +189,7 @@ fn add_smoothed_forces(
             sum_patches(energy, &model.volume_patches, material, &undamped, x, frame, rest, force)
         });
         elastic.energy += volume.energy;
+        elastic.evaluated += volume.evaluated;
     }
     elastic
 }
@@ -215,11 +220,11 @@ fn sum_patches[E: ElementEnergy](
         least_trace = least_trace.zip(turn_trace(&response.rotation, frame), f64::min);
         patches.scatter_forces(block, &response.stress, force);
         if total.sum() > limit {
-            return Elastic { energy: f64::INFINITY, least_trace: 3.0 };
+            return Elastic { energy: f64::INFINITY, least_trace: 3.0, evaluated: (block + 1) * LANES };
         }
     }
     let least_trace = least_trace.0.into_iter().fold(3.0, f64::min);
-    Elastic { energy: total.sum(), least_trace }
+    Elastic { energy: total.sum(), least_trace, evaluated: patches.count }
 }
 }
 

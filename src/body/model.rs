@@ -193,13 +193,6 @@ impl DeformableModel {
         self.half_thickness.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Number of elements of all kinds that have an energy.
-    pub(crate) fn element_count(&self) -> usize {
-        let tetrahedra = if self.is_solid() { self.tetrahedra.len() } else { 0 };
-        let solid = if self.is_smoothed() { self.patches.count } else { tetrahedra };
-        solid + self.triangles.len() + self.stencils.len()
-    }
-
     /// Rest position of a vertex \[m\].
     ///
     /// # Panics

@@ -289,6 +289,7 @@ impl BodyProblem {
         let elastic = timed(time, || {
             elastic::add_forces(&elements, &self.damping, &at.x, &self.frame, limit, &mut at.r)
         });
+        self.metric.effort.elements += elastic.evaluated;
         if elastic.energy == f64::INFINITY {
             at.objective = f64::INFINITY;
             return;
@@ -304,7 +305,6 @@ impl BodyProblem {
             kinetic += m * (inertia * from_target.norm_squared() + drag * moved.norm_squared());
         }
         at.objective = elastic.energy + 0.5 * kinetic;
-        self.metric.effort.elements += self.model.element_count();
     }
 
     /// The guard [cf. Nocedal & Wright 2006, sufficient decrease]:
