@@ -33,7 +33,7 @@ fn copy_speed(bytes: usize) -> f64 {
 
 /// What an element of each energy takes, on a hanging beam of 4000 tetrahedra, and smoothed.
 fn energies() {
-    let all = Elasticity::ALL.into_iter().map(|energy| (energy, false));
+    let all = Elasticity::ALL.iter().map(|energy| (*energy, false));
     for (elasticity, smoothed) in all.chain([(Elasticity::LinearCorotated, true)]) {
         let mut physics = PhysicsWorld::new();
         let mut world = DeformableWorld::new();

@@ -171,7 +171,7 @@ fn pressed(elasticity: Elasticity, cells: usize, fidelity: Fidelity) -> (f64, f6
 
 #[test]
 fn pressed_cube_of_049_keeps_its_volume_and_bulges_as_newtons_method_says() {
-    for elasticity in Elasticity::ALL {
+    for &elasticity in Elasticity::ALL {
         let (volume, bulge) = pressed(elasticity, 8, Fidelity::Engineering);
         let (true_volume, true_bulge) = pressed(elasticity, 8, Fidelity::Reference);
         let game = pressed(elasticity, 8, Fidelity::Game);

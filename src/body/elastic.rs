@@ -228,6 +228,42 @@ fn sum_patches[E: ElementEnergy](
 }
 }
 
+/// Adds minus the elastic part of the constant matrix times `v` to `out`, of the solid elements: the linear forces of
+/// the rest shape under the displacements v, or of the Laplacian.
+pub(crate) fn add_linear_forces(elements: &Elements<'_>, is_laplacian: bool, v: &[Vec3], out: &mut [Vec3]) {
+    let Elements { model, material, .. } = elements;
+    let lame = material.lame();
+    let weight = with_energy!(material, energy => energy.laplacian_weight());
+    let laplacian = is_laplacian.then_some(weight);
+    sum_linear(model, lame, laplacian, v, out);
+}
+
+vectorized! {
+fn sum_linear[](model: &DeformableModel, lame: Lame, laplacian: Option<f64>, v: &[Vec3], out: &mut [Vec3]) {
+    for block in 0..solid_blocks(model) {
+        let G = solid_gradient(model, block, v);
+        let stress = match laplacian {
+            Some(weight) => G.scaled(Lane::splat(weight)),
+            None => {
+                let pressure = (G.at(0, 0) + G.at(1, 1) + G.at(2, 2)) * lame.lambda;
+                let mut stress = LaneMat3::default();
+                for c in 0..3 {
+                    for r in 0..3 {
+                        stress.0[3 * c + r] = (G.at(r, c) + G.at(c, r)) * lame.mu;
+                    }
+                    stress.0[4 * c] += pressure;
+                }
+                stress
+            }
+        };
+        match model.is_smoothed() {
+            true => model.patches.scatter_forces(block, &stress, out),
+            false => scatter_forces(&model.blocks[block], &stress, out),
+        }
+    }
+}
+}
+
 /// `tr(QᵀR)`.
 #[inline(always)]
 fn turn_trace(rotation: &LaneMat3, frame: &Mat3) -> Lane {

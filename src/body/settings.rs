@@ -9,8 +9,8 @@ pub enum Solver {
     /// [`SystemMatrix`], factored once.
     #[default]
     Projective,
-    /// The constant matrix by conjugate gradients: no factor to make or keep. For bodies whose matrix would
-    /// change all the time, or whose factor would not fit.
+    /// The constant matrix by conjugate gradients, element by element: neither matrix nor factor to make or keep. For
+    /// bodies whose matrix would change all the time, or whose factor would not fit.
     ConjugateGradients,
     /// One sweep of Gauss–Seidel there and back over the constant matrix, in the place of its solution
     /// [Fratarcangeli et al. 2016]: position-based dynamics with the stiffness that was typed. Cheap and

@@ -87,6 +87,38 @@ pub(crate) fn add_thin_bounds(elements: &Elements<'_>, mut add: impl FnMut(usize
     }
 }
 
+/// Adds the blocks on the diagonal of the elastic part of the constant matrix: of the rest stiffness, or of the
+/// Laplacian.
+pub(crate) fn add_diagonal(elements: &Elements<'_>, is_laplacian: bool, diagonal: &mut [Mat3]) {
+    let Elements { model, material, .. } = elements;
+    let lame = material.lame();
+    let weight = with_energy!(material, energy => energy.laplacian_weight());
+    let mut add = |n: u32, g: &Vec3, volume: f64| {
+        let along = g * g.transpose();
+        let block = match is_laplacian {
+            true => Mat3::from_diagonal_element(weight * g.norm_squared()),
+            false => {
+                (Mat3::from_diagonal_element(g.norm_squared()) + along) * lame.mu + along * lame.lambda
+            }
+        };
+        diagonal[n as usize] += block * volume;
+    };
+    for (corners, volume) in model.patches.iter() {
+        corners.iter().for_each(|(n, g)| add(*n, g, volume));
+    }
+    let solid = if model.is_smoothed() { 0 } else { LANES * model.blocks.len() };
+    for (e, tet) in model.tetrahedra.iter().enumerate().take(solid) {
+        let block = &model.blocks[e / LANES];
+        let gradients = block.shape_gradients(e % LANES);
+        tet.iter().zip(&gradients).for_each(|(n, g)| add(*n, g, block.volumes.0[e % LANES]));
+    }
+    add_thin_bounds(elements, |i, j, k| {
+        if i == j {
+            diagonal[i] += Mat3::from_diagonal_element(k);
+        }
+    });
+}
+
 /// The blocks `Σ_k w_k u_k,a u_k,bᵀ` of an element with the modes' sides u.
 fn add_products<const N: usize, const M: usize>(
     nodes: &[u32; N],

@@ -1,53 +1,89 @@
 //! Elastic energies, one file each: of tetrahedra, of triangles ([`membrane`]), and of whatever has a length
 //! that it wants to keep ([`stencil`]): springs, bent rods and sheets, muscle fibres.
 //!
-//! To add one for tetrahedra: a file with a type that implements [`ElementEnergy`], a variant of
-//! [`Elasticity`] and its place in `Elasticity::ALL`, and its line in `with_energy!`. The tests below cover
-//! every variant.
+//! To add one for tetrahedra: a file with a type that implements [`ElementEnergy`], and its line in the list of
+//! `energies!` below, with what is to be said of it. The tests cover all of the list.
 
-mod fixed_corotated;
-mod linear_corotated;
 pub(crate) mod membrane;
-mod neo_hookean;
 mod principal;
-mod projective;
 pub(crate) mod stencil;
 pub(crate) mod strain_limit;
 
-pub(crate) use fixed_corotated::FixedCorotated;
-pub(crate) use linear_corotated::LinearCorotated;
-pub(crate) use neo_hookean::NeoHookean;
 pub(crate) use principal::{Mode, Principal, modes};
-pub(crate) use projective::Projective;
 pub(crate) use strain_limit::Limited;
 
 use crate::math::lanes::{Lane, LaneMat3};
 use crate::math::{Mat3, Vec3};
 
-/// The elastic energy of a body's tetrahedra, as a function of the deformation gradient `F`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Elasticity {
+/// Makes of the list of energies their modules, the public enum, and the dispatch on it. The first token is a
+/// dollar sign, for the macro that it defines.
+macro_rules! energies {
+    ($d:tt $($(#[$doc:meta])* $module:ident::$name:ident,)*) => {
+        $(mod $module; pub(crate) use $module::$name;)*
+
+        /// The elastic energy of a body's tetrahedra, as a function of the deformation gradient `F`.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        #[non_exhaustive]
+        pub enum Elasticity {
+            $($(#[$doc])* $name,)*
+        }
+
+        impl Elasticity {
+            /// Every variant.
+            pub const ALL: &[Self] = &[$(Self::$name),*];
+        }
+
+        /// Runs `$body` with `$energy` bound to the energy of a material, with its Lamé parameters or others.
+        macro_rules! with_energy {
+            ($d material:expr, $d energy:ident => $d body:expr) => {
+                $crate::energy::with_energy!($d material, $d material.lame(), $d energy => $d body)
+            };
+            ($d material:expr, $d lame:expr, $d energy:ident => $d body:expr) => {{
+                let (material, lame) = ($d material, $d lame);
+                match material.elasticity {
+                    $($crate::energy::Elasticity::$name => $crate::energy::limited_or_not!(
+                        material, $crate::energy::$name(lame), $d energy => $d body
+                    ),)*
+                }
+            }};
+        }
+        pub(crate) use with_energy;
+    };
+}
+
+/// Runs `$body` with `$energy` bound to `$own`, within the material's limits of strain if it has such.
+macro_rules! limited_or_not {
+    ($material:expr, $own:expr, $energy:ident => $body:expr) => {
+        match $material.strain_limits {
+            None => {
+                let $energy = $own;
+                $body
+            }
+            Some(limits) => {
+                let weight = $material.limit_weight();
+                let $energy = $crate::energy::Limited { energy: $own, limits, weight };
+                $body
+            }
+        }
+    };
+}
+pub(crate) use limited_or_not;
+
+energies! { $
     /// `μ‖F − R‖² + λ/2·tr²(RᵀF − I)`, the default. At small strain exactly linear elasticity of
     /// (E, ν), under any rotation; recovers from inversion.
     #[default]
-    LinearCorotated,
+    linear_corotated::LinearCorotated,
     /// The two Projective Dynamics constraints [Bouaziz et al. 2014]: `μ‖F − R‖²` (weight 2μ) and
     /// `3λ/2·‖F − D‖²` with D the nearest matrix of determinant 1 (weight 3λ). The same as
     /// [`Elasticity::LinearCorotated`] at small strain; keeps volume better at large.
-    Projective,
+    projective::Projective,
     /// `μ‖F − R‖² + λ/2·(det F − 1)²` [Stomakhin et al. 2012]: as the linear one, with the volume itself in
     /// the place of its linear part.
-    FixedCorotated,
+    fixed_corotated::FixedCorotated,
     /// Stable neo-Hookean, `μ/2·(tr FᵀF − 3) − μ(J − 1) + (λ + μ)/2·(J − 1)²` with J = det F
     /// [Smith et al. 2018]: rubber at large strain, finite when inverted.
-    NeoHookean,
-}
-
-impl Elasticity {
-    /// Every variant.
-    pub const ALL: [Self; 4] =
-        [Self::LinearCorotated, Self::Projective, Self::FixedCorotated, Self::NeoHookean];
+    neo_hookean::NeoHookean,
 }
 
 /// What an element answers to its deformation.
@@ -73,50 +109,6 @@ pub(crate) trait ElementEnergy: Copy + Send + Sync {
     /// `M/h² + Σ w V GᵀG`: an upper bound of the energy's curvature.
     fn laplacian_weight(&self) -> f64;
 }
-
-/// Runs `$body` with `$energy` bound to the energy of a material, with its Lamé parameters or others.
-macro_rules! with_energy {
-    ($material:expr, $energy:ident => $body:expr) => {
-        $crate::energy::with_energy!($material, $material.lame(), $energy => $body)
-    };
-    ($material:expr, $lame:expr, $energy:ident => $body:expr) => {{
-        use $crate::energy::{Elasticity, FixedCorotated, LinearCorotated, NeoHookean, Projective};
-        let (material, lame) = ($material, $lame);
-        match material.elasticity {
-            Elasticity::LinearCorotated => {
-                $crate::energy::limited_or_not!(material, LinearCorotated(lame), $energy => $body)
-            }
-            Elasticity::Projective => {
-                $crate::energy::limited_or_not!(material, Projective(lame), $energy => $body)
-            }
-            Elasticity::FixedCorotated => {
-                $crate::energy::limited_or_not!(material, FixedCorotated(lame), $energy => $body)
-            }
-            Elasticity::NeoHookean => {
-                $crate::energy::limited_or_not!(material, NeoHookean(lame), $energy => $body)
-            }
-        }
-    }};
-}
-pub(crate) use with_energy;
-
-/// Runs `$body` with `$energy` bound to `$own`, within the material's limits of strain if it has such.
-macro_rules! limited_or_not {
-    ($material:expr, $own:expr, $energy:ident => $body:expr) => {
-        match $material.strain_limits {
-            None => {
-                let $energy = $own;
-                $body
-            }
-            Some(limits) => {
-                let weight = $material.limit_weight();
-                let $energy = $crate::energy::Limited { energy: $own, limits, weight };
-                $body
-            }
-        }
-    };
-}
-pub(crate) use limited_or_not;
 
 /// `‖D‖²`, `R : D`, `det D` and `det F − 1 = R:D + ((R:D)² − ‖D‖²)/2 + det D` of `D = F − R`: nothing that is small
 /// is a difference of what is not.
@@ -145,7 +137,7 @@ mod tests {
     fn all() -> impl Iterator<Item = DeformableMaterial> {
         let plain = DeformableMaterial::new(1.0, 0.4);
         let limited = plain.strain_limits(0.9, 1.1);
-        Elasticity::ALL.into_iter().map(move |e| plain.elasticity(e)).chain([limited])
+        Elasticity::ALL.iter().map(move |e| plain.elasticity(*e)).chain([limited])
     }
 
     fn response(material: &DeformableMaterial, F: &Mat3) -> (f64, Mat3) {

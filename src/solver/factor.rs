@@ -3,7 +3,8 @@
 //! All solves are sequential (`Par::Seq`): faer's threads cost more than small supernodes are
 //! worth, and parallelism is over bodies. Everything works in memory the caller owns.
 
-use super::sweeps::{ConjugateScratch, UpperTriangle};
+use super::operator::{ConjugateScratch, StiffnessOperator};
+use super::sweeps::UpperTriangle;
 use super::triangular::{Entry, Supernodes, Values};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
@@ -25,8 +26,8 @@ pub(crate) const BATCH: usize = 24;
 /// Sparsity of a symmetric matrix (upper triangle by columns) and of its factor.
 #[derive(Debug)]
 pub(crate) struct Symbolic {
-    pattern: SymbolicSparseColMat<usize>,
-    cholesky: SymbolicCholesky<usize>,
+    /// None of a matrix that is not put together.
+    analysis: Option<(SymbolicSparseColMat<usize>, SymbolicCholesky<usize>)>,
     supernodes: Supernodes,
     /// Old index at each new place, and the other way round.
     order: Vec<usize>,
@@ -44,8 +45,8 @@ pub(crate) enum Factor {
     Jacobi(Vec<f64>),
     /// The matrix itself, with a sweep of Gauss–Seidel for its inverse.
     GaussSeidel(Vec<f64>),
-    /// The matrix itself, solved by conjugate gradients.
-    Iterative(Vec<f64>),
+    /// What the matrix does, for conjugate gradients.
+    Iterative(Box<StiffnessOperator>),
 }
 
 impl Factor {
@@ -66,9 +67,8 @@ impl Factor {
         match self {
             Self::Double(values) => values.bytes(),
             Self::Single(values) => values.bytes(),
-            Self::Jacobi(values) | Self::GaussSeidel(values) | Self::Iterative(values) => {
-                size_of_val(values.as_slice())
-            }
+            Self::Jacobi(values) | Self::GaussSeidel(values) => size_of_val(values.as_slice()),
+            Self::Iterative(operator) => operator.bytes(),
         }
     }
 }
@@ -106,20 +106,26 @@ impl Symbolic {
         let cholesky = cholesky.ok()?;
         let supernodes = supernodes_of(&cholesky);
         let (order, places) = cholesky.perm().map(|p| p.arrays()).map(|(o, p)| (o.to_vec(), p.to_vec()))?;
-        Some(Self { pattern, cholesky, supernodes, order, places })
+        Some(Self { analysis: Some((pattern, cholesky)), supernodes, order, places })
+    }
+
+    /// Of `n` unknowns in their own order, without a matrix.
+    pub fn without_matrix(n: usize) -> Self {
+        let order: Vec<usize> = (0..n).collect();
+        Self { analysis: None, supernodes: Supernodes::default(), places: order.clone(), order }
     }
 
     pub fn column_starts(&self) -> &[usize] {
-        self.pattern.col_ptr()
+        self.analysis.as_ref().map_or(&[], |(pattern, _)| pattern.col_ptr())
     }
 
     pub fn rows(&self) -> &[usize] {
-        self.pattern.row_idx()
+        self.analysis.as_ref().map_or(&[], |(pattern, _)| pattern.row_idx())
     }
 
     /// Numbers in a numeric factor.
     pub fn factor_len(&self) -> usize {
-        self.cholesky.len_val()
+        self.analysis.as_ref().map_or(0, |(_, cholesky)| cholesky.len_val())
     }
 
     /// Factors the matrix with these `values`, in the order of [`Symbolic::rows`].
@@ -128,10 +134,11 @@ impl Symbolic {
         values: &[f64],
         scratch: &mut FactorScratch,
     ) -> Result<Factor, NotPositiveDefinite> {
-        let A = SparseColMatRef::new(self.pattern.as_ref(), values);
-        let need = self.cholesky.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
-        let mut factor = vec![0.0; self.cholesky.len_val()];
-        self.cholesky
+        let Some((pattern, cholesky)) = &self.analysis else { return Err(NotPositiveDefinite) };
+        let A = SparseColMatRef::new(pattern.as_ref(), values);
+        let need = cholesky.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
+        let mut factor = vec![0.0; cholesky.len_val()];
+        cholesky
             .factorize_numeric_llt(
                 &mut factor,
                 A,
@@ -172,7 +179,7 @@ impl Symbolic {
             Factor::Double(_) | Factor::Single(_) => {}
             Factor::Jacobi(inverse) => x.iter_mut().zip(inverse).for_each(|(x, d)| *x *= d),
             Factor::GaussSeidel(values) => self.upper(values).sweep(x),
-            Factor::Iterative(values) => self.upper(values).conjugate_gradients(x, &mut scratch.conjugate),
+            Factor::Iterative(operator) => operator.solve(x, &mut scratch.conjugate),
         }
     }
 

@@ -6,6 +6,7 @@
 use super::clusters::Clusters;
 use super::columns::Columns;
 use super::factor::{BATCH, Factor, FactorScratch, Symbolic};
+use super::operator::StiffnessOperator;
 use super::system::{self, FactorKey};
 use crate::body::{DeformableBody, DeformableModel, Solver, SystemMatrix};
 use std::collections::HashMap;
@@ -37,7 +38,8 @@ pub(crate) struct FactorId(usize);
 /// All factors of a world.
 #[derive(Default)]
 pub(crate) struct FactorCache {
-    symbolic: HashMap<(u64, SystemMatrix), Arc<Symbolic>>,
+    /// By model, matrix, and whether it is put together.
+    symbolic: HashMap<(u64, SystemMatrix, bool), Arc<Symbolic>>,
     factors: Vec<Entry>,
     places: HashMap<FactorKey, usize>,
     scratch: FactorScratch,
@@ -93,7 +95,7 @@ impl FactorCache {
         self.factors.retain(|f| f.last_used >= oldest);
         self.places.clear();
         self.places.extend(self.factors.iter().enumerate().map(|(place, f)| (f.key.clone(), place)));
-        self.symbolic.retain(|(model, _), _| self.factors.iter().any(|f| f.key.model == *model));
+        self.symbolic.retain(|(model, ..), _| self.factors.iter().any(|f| f.key.model == *model));
     }
 
     /// Makes sure the factor of a body and the inverse's columns at these surface nodes are there.
@@ -107,26 +109,41 @@ impl FactorCache {
     ) -> Option<CacheWork> {
         let mut work = CacheWork::default();
         if !self.places.contains_key(key) {
-            let symbolic = match self.symbolic.get(&(key.model, key.system)) {
+            let has_matrix = key.solver != Solver::ConjugateGradients;
+            let name = (key.model, key.system, has_matrix);
+            let symbolic = match self.symbolic.get(&name) {
                 Some(symbolic) => symbolic.clone(),
                 None => {
-                    let made = Arc::new(system::symbolic(&body.model, key.system)?);
-                    self.symbolic.insert((key.model, key.system), made.clone());
+                    let unknowns = system::dimension(key.system) * body.model.rest.len();
+                    let made = match has_matrix {
+                        true => system::symbolic(&body.model, key.system)?,
+                        false => Symbolic::without_matrix(unknowns),
+                    };
+                    let made = Arc::new(made);
+                    self.symbolic.insert(name, made.clone());
                     made
                 }
             };
-            let values = system::assemble(&body.model, &body.material, &key.pins, key.system, h, &symbolic);
+            let assembled =
+                || system::assemble(&body.model, &body.material, &key.pins, key.system, h, &symbolic);
             let factor = match key.solver {
                 Solver::Projective => {
+                    let values = assembled();
                     let factor = symbolic.factorize(&values, &mut self.scratch).ok()?;
                     let is_single =
                         system::in_single_precision(body, !key.pins.is_empty(), h, &symbolic, &values);
                     if is_single { factor.rounded() } else { factor }
                 }
-                Solver::ConjugateGradients => Factor::Iterative(values),
-                Solver::GaussSeidel => Factor::GaussSeidel(values),
+                Solver::ConjugateGradients => {
+                    let (model, material) = (&body.model, &body.material);
+                    let operator = StiffnessOperator::new(model, material, &key.pins, key.system, h);
+                    Factor::Iterative(Box::new(operator))
+                }
+                Solver::GaussSeidel => Factor::GaussSeidel(assembled()),
                 // Newton's method makes its own, and falls back on this.
-                Solver::Jacobi | Solver::Newton => Factor::Jacobi(symbolic.upper(&values).inverse_row_sums()),
+                Solver::Jacobi | Solver::Newton => {
+                    Factor::Jacobi(symbolic.upper(&assembled()).inverse_row_sums())
+                },
             };
             work.factorizations = 1;
             let columns = Columns::new(&body.model.surface, key.system);

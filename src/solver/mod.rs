@@ -22,6 +22,7 @@ mod factor_cache;
 mod island;
 mod lbfgs;
 mod metric;
+mod operator;
 mod partner;
 mod starting;
 mod sweeps;

@@ -1,7 +1,7 @@
-//! Answers to `A x = b` without a factor: a diagonal, a sweep of Gauss–Seidel, conjugate gradients.
+//! Answers to `A x = b` without a factor: a diagonal, a sweep of Gauss–Seidel.
 //!
 //! The matrix is given by its upper triangle, column by column. Everything is symmetric positive definite if A
-//! is, so contacts can be solved with it as with A⁻¹; the first two fall short of A⁻¹, never beyond.
+//! is, so contacts can be solved with it as with A⁻¹; both fall short of A⁻¹, never beyond.
 
 /// The upper triangle of a symmetric matrix by columns; rows ascend, the diagonal is last.
 #[derive(Clone, Copy)]
@@ -10,21 +10,6 @@ pub(crate) struct UpperTriangle<'a> {
     pub rows: &'a [usize],
     pub values: &'a [f64],
 }
-
-/// Memory for conjugate gradients.
-#[derive(Default)]
-pub(crate) struct ConjugateScratch {
-    residual: Vec<f64>,
-    direction: Vec<f64>,
-    image: Vec<f64>,
-    preconditioned: Vec<f64>,
-}
-
-/// Where conjugate gradients stop: residual over right-hand side. Contacts want columns that agree with
-/// what a step does.
-const TOLERANCE: f64 = 1.0e-8;
-/// Steps of conjugate gradients at the most.
-const MAX_STEPS: usize = 500;
 
 impl<'a> UpperTriangle<'a> {
     /// Entries above the diagonal of column `j`, and the diagonal.
@@ -69,54 +54,6 @@ impl<'a> UpperTriangle<'a> {
             }
         }
     }
-
-    fn multiply(&self, x: &[f64], out: &mut Vec<f64>) {
-        out.clear();
-        out.resize(x.len(), 0.0);
-        for j in 0..self.len() {
-            let (rows, above, diagonal) = self.column(j);
-            let mut sum = diagonal * x[j];
-            for (&i, a) in rows.iter().zip(above) {
-                sum += a * x[i];
-                out[i] += a * x[j];
-            }
-            out[j] += sum;
-        }
-    }
-
-    /// Conjugate gradients with the sweep as preconditioner, from zero [Saad 2003, algorithm 9.1].
-    pub fn conjugate_gradients(&self, x: &mut [f64], scratch: &mut ConjugateScratch) {
-        let ConjugateScratch { residual: r, direction: p, image: Ap, preconditioned: z } = scratch;
-        r.clear();
-        r.extend_from_slice(x);
-        x.fill(0.0);
-        z.clone_from(r);
-        self.sweep(z);
-        p.clone_from(z);
-        let goal = TOLERANCE * dot(r, r).sqrt();
-        let mut before = dot(r, z);
-        for _ in 0..MAX_STEPS {
-            if !(dot(r, r).sqrt() > goal) {
-                break;
-            }
-            self.multiply(p, Ap);
-            let length = before / dot(p, Ap);
-            for k in 0..x.len() {
-                x[k] += length * p[k];
-                r[k] -= length * Ap[k];
-            }
-            z.clone_from(r);
-            self.sweep(z);
-            let now = dot(r, z);
-            let turn = now / before;
-            before = now;
-            p.iter_mut().zip(&*z).for_each(|(p, z)| *p = z + turn * *p);
-        }
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]
@@ -152,10 +89,6 @@ mod tests {
             let mut x = b.clone();
             upper.sweep(x.as_mut_slice());
             prop_assert!((&x - expected).amax() < 1e-12);
-            let mut x = b.clone();
-            upper.conjugate_gradients(x.as_mut_slice(), &mut ConjugateScratch::default());
-            // Condition about 3 by diagonal dominance.
-            prop_assert!((&A * &x - &b).norm() <= 2.0 * TOLERANCE * b.norm());
             // The diagonal bounds A from above.
             let bound = DMatrix::from_diagonal(&DVector::from_vec(upper.inverse_row_sums()).map(|v| 1.0 / v));
             prop_assert!((bound - &A).symmetric_eigen().eigenvalues.min() > -1e-12);

@@ -7,6 +7,7 @@ use super::contact_system::{ContactLimits, ContactSystem};
 use super::factor::FactorScratch;
 use super::factor_cache::{FactorCache, SystemFactor};
 use super::island::Island;
+use super::operator::{ConjugateScratch, StiffnessOperator};
 use super::partner::{Partner, Partners, Reaction, Twist};
 use super::system::{FactorKey, assemble};
 use crate::body::{
@@ -147,6 +148,25 @@ fn delassus_blocks_are_what_the_metric_does() {
                 // Two solves of a matrix of condition 1e3.
                 assert!((moved - block.column(c)).norm() < 1e-12 * block.norm(), "{system:?} {frames:?}");
             }
+        }
+    }
+}
+
+#[test]
+fn operator_solves_what_the_assembled_matrix_is() {
+    let material = DeformableMaterial::new(1e5, 0.4).mass_damping(0.5).stiffness_damping(0.01);
+    let block = || DeformableBodyBuilder::cuboid(Vector::new(0.3, 0.2, 0.2), [3, 2, 2]);
+    let cloth = DeformableBodyBuilder::cloth([0.2, 0.1], [4, 3], 0.01);
+    for builder in [block(), block().smoothed(), cloth] {
+        let body = builder.material(material).build().unwrap();
+        for system in [SystemMatrix::Laplacian, SystemMatrix::RestStiffness] {
+            let A = dense(&body, system);
+            let operator = StiffnessOperator::new(&body.model, &body.material, &[], system, H);
+            let b = DVector::from_fn(A.nrows(), |i, _| ((i * 37 % 101) as f64 - 50.0) * 10.0);
+            let mut x = b.clone();
+            operator.solve(x.as_mut_slice(), &mut ConjugateScratch::default());
+            // Stops at 1e-8 of the right-hand side.
+            assert!((&A * &x - &b).norm() < 2e-8 * b.norm(), "{system:?}: {:e}", (&A * &x - &b).norm());
         }
     }
 }
