@@ -97,9 +97,7 @@ pub(crate) fn add_diagonal(elements: &Elements<'_>, is_laplacian: bool, diagonal
         let along = g * g.transpose();
         let block = match is_laplacian {
             true => Mat3::from_diagonal_element(weight * g.norm_squared()),
-            false => {
-                (Mat3::from_diagonal_element(g.norm_squared()) + along) * lame.mu + along * lame.lambda
-            }
+            false => (Mat3::from_diagonal_element(g.norm_squared()) + along) * lame.mu + along * lame.lambda,
         };
         diagonal[n as usize] += block * volume;
     };

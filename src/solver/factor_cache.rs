@@ -143,7 +143,7 @@ impl FactorCache {
                 // Newton's method makes its own, and falls back on this.
                 Solver::Jacobi | Solver::Newton => {
                     Factor::Jacobi(symbolic.upper(&assembled()).inverse_row_sums())
-                },
+                }
             };
             work.factorizations = 1;
             let columns = Columns::new(&body.model.surface, key.system);
