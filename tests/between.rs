@@ -136,8 +136,9 @@ fn a_pile_has_the_same_bits_with_any_number_of_threads_and_a_fresh_pipeline() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let mut world = DeformableWorld::new();
-            let mut physics = pile(8, &mut world);
-            for _ in 0..70 {
+            let mut physics = pile(20, &mut world);
+            // Two seconds: all have landed, and the first lie still.
+            for _ in 0..120 {
                 if fresh {
                     world.pipeline = DeformablePipeline::new();
                 }

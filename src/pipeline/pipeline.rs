@@ -121,7 +121,8 @@ impl DeformablePipeline {
         self.reactions.take_back(parts);
     }
 
-    /// Makes factors, and columns for contact anywhere on the surface, ahead of time.
+    /// Makes factors, and columns for contact anywhere on the surface, ahead of time; not for bodies that
+    /// hard attachments hold, whose matrix depends on what they are tied to.
     ///
     /// # Errors
     /// [`DeformableBodyError::TimeStep`].
