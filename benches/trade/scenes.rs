@@ -280,38 +280,65 @@ impl Scene {
 
     /// The box is watched.
     fn run_grasp(&self, rung: &Rung) -> Record {
-        let mut physics = self.world();
+        let mut stage = Grasp::new(self);
         let mut world = DeformableWorld::new();
+        for (carrier, side) in stage.carriers {
+            let pad = self.builder().translation(Grasp::pad(side));
+            let pad = world.insert(chosen(pad, rung)).expect("a valid body");
+            let back = world.bodies[pad].vertices_where(|x| x.x.abs() > Grasp::BACK);
+            let on = AttachTo::RigidBody(carrier, *stage.physics.bodies[carrier].position());
+            world.bodies.attach(pad, &back, on).expect("surface vertices");
+        }
+        stage.run(self, |physics| world.step(physics))
+    }
+}
+
+/// A box on a table between two carriers.
+pub struct Grasp {
+    pub physics: PhysicsWorld,
+    load: RigidBodyHandle,
+    pub carriers: [(RigidBodyHandle, f32); 2],
+}
+
+impl Grasp {
+    /// Beyond this the pads are tied \[m\].
+    pub const BACK: f32 = 0.1549;
+
+    pub fn new(scene: &Scene) -> Self {
+        let mut physics = scene.world();
         let table = RigidBodyBuilder::fixed().translation(Vector::Y * -0.1);
         physics.insert(table, ColliderBuilder::cuboid(0.03, 0.05, 0.03).friction(0.8));
         let load = RigidBodyBuilder::dynamic().can_sleep(false);
-        let (load, _) =
-            physics.insert(load, ColliderBuilder::cuboid(0.05, 0.05, 0.05).density(800.0).friction(0.8));
+        let collider = ColliderBuilder::cuboid(0.05, 0.05, 0.05).density(800.0).friction(0.8);
+        let (load, _) = physics.insert(load, collider);
         let carriers = [-1.0f32, 1.0].map(|side| {
             let at = Vector::X * (side * 0.18);
             let carrier = RigidBodyBuilder::kinematic_position_based().translation(at);
-            let (carrier, _) =
-                physics.insert(carrier, ColliderBuilder::cuboid(0.02, 0.06, 0.06).sensor(true));
-            let pad = self.builder().translation(Vector::X * (side * 0.105));
-            let pad = world.insert(chosen(pad, rung)).expect("a valid body");
-            let back = world.bodies[pad].vertices_where(|x| x.x.abs() > 0.1549);
-            let on = AttachTo::RigidBody(carrier, *physics.bodies[carrier].position());
-            world.bodies.attach(pad, &back, on).expect("surface vertices");
-            (carrier, side)
+            let collider = ColliderBuilder::cuboid(0.02, 0.06, 0.06).sensor(true);
+            (physics.insert(carrier, collider).0, side)
         });
+        Self { physics, load, carriers }
+    }
+
+    /// Where the middle of a pad is at the start.
+    pub fn pad(side: f32) -> Vector {
+        Vector::X * (side * 0.105)
+    }
+
+    pub fn run(&mut self, scene: &Scene, mut advance: impl FnMut(&mut PhysicsWorld)) -> Record {
         let mut record = Record::default();
-        for step in 0..self.steps {
+        for step in 0..scene.steps {
             // Close within a third of a second, then lift.
-            let t = (step + 1) as f32 * self.dt;
+            let t = (step + 1) as f32 * scene.dt;
             let (close, lift) = (0.02 * (3.0 * t).min(1.0), 0.1 * (t - 0.5).clamp(0.0, 1.0));
-            for (carrier, side) in carriers {
+            for (carrier, side) in self.carriers {
                 let at = Vector::new(side * (0.18 - close), lift, 0.0);
-                physics.bodies[carrier].set_next_kinematic_translation(at);
+                self.physics.bodies[carrier].set_next_kinematic_translation(at);
             }
             let start = Instant::now();
-            world.step(&mut physics);
+            advance(&mut self.physics);
             record.times.push(start.elapsed().as_secs_f64() * 1e3);
-            let p = physics.bodies[load].translation();
+            let p = self.physics.bodies[self.load].translation();
             record.path.push(p.to_array().map(f64::from));
         }
         record
