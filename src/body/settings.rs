@@ -123,7 +123,7 @@ pub enum Fidelity {
     /// One iteration of the [`SystemMatrix::Laplacian`], with eight clusters: the smallest factors, the fewest
     /// solves, and motion that looks right; of ropes one iteration of Newton's method.
     Preview,
-    /// The defaults, at three times their tolerance.
+    /// The defaults, at four times their tolerance.
     Game,
     /// Iterated until less than a hundredth of the error of [`Fidelity::Game`] is left; sheets by Newton's method.
     Engineering,
@@ -166,7 +166,7 @@ impl Fidelity {
             (Self::Preview, _) => {
                 SolverSettings { max_iterations: 1, tolerance: 0.0, clusters: 8, ..laplacian }
             }
-            (Self::Game, Build::Solid) => SolverSettings { tolerance: 3.0 * defaults.tolerance, ..defaults },
+            (Self::Game, Build::Solid) => SolverSettings { tolerance: 4.0 * defaults.tolerance, ..defaults },
             (Self::Game, _) => build.defaults(),
             (Self::Engineering, Build::Solid) => {
                 SolverSettings { max_iterations: 50, tolerance: 1.0e-5, ..defaults }
