@@ -68,15 +68,23 @@ fn push_stretches[](model: &DeformableModel, x: &[Vec3], stretches: &mut Vec<Lan
 
 /// Blocks of tetrahedra, or of the patches that stand for them.
 #[inline(always)]
-fn solid_blocks(model: &DeformableModel) -> usize {
+pub(super) fn solid_blocks(model: &DeformableModel) -> usize {
     if model.is_smoothed() { model.patches.block_count() } else { model.blocks.len() }
 }
 
 #[inline(always)]
-fn solid_gradient(model: &DeformableModel, block: usize, x: &[Vec3]) -> LaneMat3 {
+pub(super) fn solid_gradient(model: &DeformableModel, block: usize, x: &[Vec3]) -> LaneMat3 {
     match model.is_smoothed() {
         true => model.patches.deformation_gradient(block, x),
         false => deformation_gradient(&model.blocks[block], x),
+    }
+}
+
+#[inline(always)]
+pub(super) fn scatter_solid(model: &DeformableModel, block: usize, stress: &LaneMat3, force: &mut [Vec3]) {
+    match model.is_smoothed() {
+        true => model.patches.scatter_forces(block, stress, force),
+        false => scatter_forces(&model.blocks[block], stress, force),
     }
 }
 
@@ -225,42 +233,6 @@ fn sum_patches[E: ElementEnergy](
     }
     let least_trace = least_trace.0.into_iter().fold(3.0, f64::min);
     Elastic { energy: total.sum(), least_trace, evaluated: patches.count }
-}
-}
-
-/// Adds minus the elastic part of the constant matrix times `v` to `out`, of the solid elements: the linear forces of
-/// the rest shape under the displacements v, or of the Laplacian.
-pub(crate) fn add_linear_forces(elements: &Elements<'_>, is_laplacian: bool, v: &[Vec3], out: &mut [Vec3]) {
-    let Elements { model, material, .. } = elements;
-    let lame = material.lame();
-    let weight = with_energy!(material, energy => energy.laplacian_weight());
-    let laplacian = is_laplacian.then_some(weight);
-    sum_linear(model, lame, laplacian, v, out);
-}
-
-vectorized! {
-fn sum_linear[](model: &DeformableModel, lame: Lame, laplacian: Option<f64>, v: &[Vec3], out: &mut [Vec3]) {
-    for block in 0..solid_blocks(model) {
-        let G = solid_gradient(model, block, v);
-        let stress = match laplacian {
-            Some(weight) => G.scaled(Lane::splat(weight)),
-            None => {
-                let pressure = (G.at(0, 0) + G.at(1, 1) + G.at(2, 2)) * lame.lambda;
-                let mut stress = LaneMat3::default();
-                for c in 0..3 {
-                    for r in 0..3 {
-                        stress.0[3 * c + r] = (G.at(r, c) + G.at(c, r)) * lame.mu;
-                    }
-                    stress.0[4 * c] += pressure;
-                }
-                stress
-            }
-        };
-        match model.is_smoothed() {
-            true => model.patches.scatter_forces(block, &stress, out),
-            false => scatter_forces(&model.blocks[block], &stress, out),
-        }
-    }
 }
 }
 

@@ -8,6 +8,7 @@ mod attachment;
 #[allow(clippy::module_inception)]
 mod body;
 mod builder;
+pub(crate) mod constant;
 mod controls;
 pub(crate) mod elastic;
 mod elements;

@@ -92,14 +92,12 @@ impl DeformableModel {
             return self;
         }
         self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
-        let tetrahedra = self.tetrahedra.iter().enumerate().map(|(e, tet)| {
-            let block = &self.blocks[e / LANES];
-            (*tet, block.shape_gradients(e % LANES), block.volumes.0[e % LANES])
-        });
-        self.patches = Patches::around_edges(tetrahedra.clone());
-        self.volume_patches = Patches::around_nodes(tetrahedra);
-        let patches: Vec<Vec<u32>> =
-            self.patches.iter().map(|(corners, _)| corners.iter().map(|c| c.0).collect()).collect();
+        let tetrahedra = self.shaped_tetrahedra();
+        let (around_edges, around_nodes) =
+            (Patches::around_edges(tetrahedra.clone()), Patches::around_nodes(tetrahedra));
+        (self.patches, self.volume_patches) = (around_edges, around_nodes);
+        let mut patches: Vec<Vec<u32>> = Vec::new();
+        self.patches.for_each(|nodes, _, _| patches.push(nodes.to_vec()));
         let stencils = self.stencils.iter().map(|s| &s.nodes[..]);
         let thin = self.triangles.iter().map(|t| &t.nodes[..]).chain(stencils);
         let solid = self.tetrahedra.iter().map(|t| &t[..]).chain(patches.iter().map(|p| &p[..]));
@@ -162,6 +160,26 @@ impl DeformableModel {
     /// Whether it is a solid, altogether or in part.
     pub fn is_solid(&self) -> bool {
         !self.blocks.is_empty()
+    }
+
+    /// Nodes, gradients of the shape functions, and volumes of the tetrahedra that have an energy.
+    fn shaped_tetrahedra(&self) -> impl Iterator<Item = ([u32; 4], [Vec3; 4], f64)> + Clone + '_ {
+        let solid = self.tetrahedra.iter().enumerate().take(LANES * self.blocks.len());
+        solid.map(|(e, tet)| {
+            let block = &self.blocks[e / LANES];
+            (*tet, block.shape_gradients(e % LANES), block.volumes.0[e % LANES])
+        })
+    }
+
+    /// Calls `with` with the nodes, the gradients of their shape functions [1/m] and the volume \[m³\] of every
+    /// solid element: tetrahedra, or the patches around edges that stand for them.
+    pub(crate) fn for_each_solid(&self, mut with: impl FnMut(&[u32], &[Vec3], f64)) {
+        if self.is_smoothed() {
+            return self.patches.for_each(with);
+        }
+        for (nodes, gradients, volume) in self.shaped_tetrahedra() {
+            with(&nodes, &gradients, volume);
+        }
     }
 
     /// Whether its tetrahedra are smoothed over their edges.

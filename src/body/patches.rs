@@ -6,8 +6,8 @@
 //! A patch is an element like any other, of all nodes of its tetrahedra, with the means of their shape
 //! gradients: `F = Σ x_a g_aᵀ`, `f_a = −V P(F) g_a`.
 
+use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lane, LaneMat3};
-use crate::math::{Mat3, Vec3};
 use std::collections::BTreeMap;
 
 /// All patches of a body, four side by side.
@@ -110,16 +110,22 @@ impl Patches {
         &self.corners[self.starts[block] as usize..self.starts[block + 1] as usize]
     }
 
-    /// Nodes of every patch with their gradients, and its volume.
-    pub fn iter(&self) -> impl Iterator<Item = (Vec<(u32, Vec3)>, f64)> + '_ {
-        (0..self.count).map(|p| {
+    /// Calls `with` with the nodes of every patch, the gradients of their shape functions, and its volume.
+    pub fn for_each(&self, mut with: impl FnMut(&[u32], &[Vec3], f64)) {
+        let (mut nodes, mut gradients) = (Vec::new(), Vec::new());
+        for p in 0..self.count {
             let (block, lane) = (p / LANES, p % LANES);
-            let corners = self
-                .corners(block)
-                .iter()
-                .map(|c| (c.nodes[lane], Vec3::from_fn(|k, _| c.gradient[k].0[lane])));
-            (corners.filter(|(_, g)| *g != Vec3::zeros()).collect(), self.volumes[block].0[lane])
-        })
+            nodes.clear();
+            gradients.clear();
+            for corner in self.corners(block) {
+                let gradient = Vec3::from_fn(|k, _| corner.gradient[k].0[lane]);
+                if gradient != Vec3::zeros() {
+                    nodes.push(corner.nodes[lane]);
+                    gradients.push(gradient);
+                }
+            }
+            with(&nodes, &gradients, self.volumes[block].0[lane]);
+        }
     }
 
     pub fn bytes(&self) -> usize {
@@ -171,9 +177,4 @@ impl Patches {
             }
         }
     }
-}
-
-/// Deformation gradient of one patch.
-pub(crate) fn deformation_gradient(corners: &[(u32, Vec3)], x: &[Vec3]) -> Mat3 {
-    corners.iter().fold(Mat3::zeros(), |F, (n, g)| F + x[*n as usize] * g.transpose())
 }

@@ -1,12 +1,9 @@
-//! Stiffness of a body's elements, block by block: at a state, as Newton's method wants it, or its bound in the
-//! constant matrix.
+//! Stiffness of a body's elements at a state, block by block, as Newton's method wants it.
 
 use super::elastic::Elements;
-use super::patches::deformation_gradient;
 use super::thin::keeper;
 use crate::energy::membrane::{Membrane, MembraneMode};
 use crate::energy::{ElementEnergy, Mode, modes, with_energy};
-use crate::math::lanes::LANES;
 use crate::math::{Mat3, Vec3};
 
 /// Calls `add(i, j, K)` with the blocks `K = −∂fᵢ/∂xⱼ` [N/m] of every element at positions `x`; of smoothed
@@ -20,37 +17,22 @@ pub(crate) fn add_tangents(
 ) {
     let Elements { model, material, activation } = elements;
     let kept = |stiffness: f64| if projected { stiffness.max(0.0) } else { stiffness };
-    for (corners, volume) in model.patches.iter() {
-        let F = deformation_gradient(&corners, x);
+    let mut sides = Vec::new();
+    model.for_each_solid(|nodes, gradients, volume| {
+        let F =
+            nodes.iter().zip(gradients).fold(Mat3::zeros(), |F, (&n, g)| F + x[n as usize] * g.transpose());
         let modes: [Mode; 9] = with_energy!(material, energy => modes(&F, |s| energy.principal(s)));
-        for (i, a) in &corners {
-            for (j, b) in &corners {
-                let mut block = Mat3::zeros();
-                for mode in &modes {
-                    let weight = kept(mode.stiffness) * volume;
-                    block += (mode.shape * a) * (mode.shape * b * weight).transpose();
-                }
-                add(*i as usize, *j as usize, &block);
-            }
-        }
-    }
-    let solid = if model.is_smoothed() { 0 } else { LANES * model.blocks.len() };
-    for (e, tet) in model.tetrahedra.iter().enumerate().take(solid) {
-        let block = &model.blocks[e / LANES];
-        let gradients = block.shape_gradients(e % LANES);
-        let volume = block.volumes.0[e % LANES];
-        let mut F = Mat3::zeros();
-        tet.iter().zip(&gradients).for_each(|(&n, g)| F += x[n as usize] * g.transpose());
-        let modes: [Mode; 9] = with_energy!(material, energy => modes(&F, |s| energy.principal(s)));
-        let sides = modes.map(|m| (kept(m.stiffness) * volume, gradients.map(|g| m.shape * g)));
-        add_products(tet, &sides, &mut add);
-    }
+        sides.clear();
+        sides.extend(modes.iter().flat_map(|m| gradients.iter().map(|g| m.shape * g)));
+        add_products(nodes, &modes.map(|m| kept(m.stiffness) * volume), &sides, &mut add);
+    });
     let sheet = Membrane::new(material);
     for triangle in &model.triangles {
         let modes: [MembraneMode; 6] = sheet.modes(&triangle.deformation_gradient(x));
-        let sides =
-            modes.map(|m| (kept(m.stiffness) * triangle.volume, triangle.gradients.map(|g| m.shape * g)));
-        add_products(&triangle.nodes, &sides, &mut add);
+        sides.clear();
+        sides.extend(modes.iter().flat_map(|m| triangle.gradients.map(|g| m.shape * g)));
+        let weights = modes.map(|m| kept(m.stiffness) * triangle.volume);
+        add_products(&triangle.nodes, &weights, &sides, &mut add);
     }
     for stencil in &model.stencils {
         let mut K = keeper(stencil, material, *activation).tangent(&stencil.vector(x));
@@ -65,68 +47,12 @@ pub(crate) fn add_tangents(
     }
 }
 
-/// As [`add_tangents`], of the thin elements only and as the multiple of I that bounds them in the constant
-/// matrix [Bouaziz et al. 2014].
-pub(crate) fn add_thin_bounds(elements: &Elements<'_>, mut add: impl FnMut(usize, usize, f64)) {
-    let Elements { model, material, activation } = elements;
-    let weight = Membrane::new(material).laplacian_weight();
-    for triangle in &model.triangles {
-        for (&i, a) in triangle.nodes.iter().zip(&triangle.gradients) {
-            for (&j, b) in triangle.nodes.iter().zip(&triangle.gradients) {
-                add(i as usize, j as usize, weight * triangle.volume * a.dot(b));
-            }
-        }
-    }
-    for stencil in &model.stencils {
-        let weight = keeper(stencil, material, *activation).weight;
-        for (i, a) in stencil.terms() {
-            for (j, b) in stencil.terms() {
-                add(i, j, weight * a * b);
-            }
-        }
-    }
-}
-
-/// Adds the blocks on the diagonal of the elastic part of the constant matrix: of the rest stiffness, or of the
-/// Laplacian.
-pub(crate) fn add_diagonal(elements: &Elements<'_>, is_laplacian: bool, diagonal: &mut [Mat3]) {
-    let Elements { model, material, .. } = elements;
-    let lame = material.lame();
-    let weight = with_energy!(material, energy => energy.laplacian_weight());
-    let mut add = |n: u32, g: &Vec3, volume: f64| {
-        let along = g * g.transpose();
-        let block = match is_laplacian {
-            true => Mat3::from_diagonal_element(weight * g.norm_squared()),
-            false => (Mat3::from_diagonal_element(g.norm_squared()) + along) * lame.mu + along * lame.lambda,
-        };
-        diagonal[n as usize] += block * volume;
-    };
-    for (corners, volume) in model.patches.iter() {
-        corners.iter().for_each(|(n, g)| add(*n, g, volume));
-    }
-    let solid = if model.is_smoothed() { 0 } else { LANES * model.blocks.len() };
-    for (e, tet) in model.tetrahedra.iter().enumerate().take(solid) {
-        let block = &model.blocks[e / LANES];
-        let gradients = block.shape_gradients(e % LANES);
-        tet.iter().zip(&gradients).for_each(|(n, g)| add(*n, g, block.volumes.0[e % LANES]));
-    }
-    add_thin_bounds(elements, |i, j, k| {
-        if i == j {
-            diagonal[i] += Mat3::from_diagonal_element(k);
-        }
-    });
-}
-
-/// The blocks `Σ_k w_k u_k,a u_k,bᵀ` of an element with the modes' sides u.
-fn add_products<const N: usize, const M: usize>(
-    nodes: &[u32; N],
-    modes: &[(f64, [Vec3; N]); M],
-    add: &mut impl FnMut(usize, usize, &Mat3),
-) {
+/// The blocks `Σ_k w_k u_k,a u_k,bᵀ` of an element with the modes' sides u, mode by mode.
+fn add_products(nodes: &[u32], weights: &[f64], sides: &[Vec3], add: &mut impl FnMut(usize, usize, &Mat3)) {
     for (a, &i) in nodes.iter().enumerate() {
         for (b, &j) in nodes.iter().enumerate() {
             let mut block = Mat3::zeros();
-            for (weight, sides) in modes {
+            for (weight, sides) in weights.iter().zip(sides.chunks_exact(nodes.len())) {
                 block += sides[a] * (sides[b] * *weight).transpose();
             }
             add(i as usize, j as usize, &block);

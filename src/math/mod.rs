@@ -47,6 +47,11 @@ pub(crate) fn solve_semidefinite(S: &Mat3, b: &Vec3) -> Vec3 {
     out
 }
 
+/// `Σ a_i·b_i` over nodes.
+pub(crate) fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+}
+
 /// The matrix of `v ↦ a × v`.
 pub(crate) fn skew(a: &Vec3) -> Mat3 {
     Mat3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)

@@ -3,7 +3,7 @@
 
 use super::body_problem::BodyProblem;
 use super::factor_cache::SystemFactor;
-use crate::math::Vec3;
+use crate::math::{Vec3, dot};
 use nalgebra::{DMatrix, DVector};
 use std::collections::VecDeque;
 
@@ -75,8 +75,4 @@ impl Anderson {
 
 fn difference(a: &[Vec3], b: &[Vec3]) -> Vec<Vec3> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
-}
-
-fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }

@@ -9,7 +9,6 @@
 
 use super::factor::{BATCH, Factor, FactorScratch, Symbolic};
 use crate::body::DeformableModel;
-use crate::math::lanes::LANES;
 use crate::math::polar::polar_rotation;
 use crate::math::{Mat3, Vec3, skew};
 use nalgebra::{DMatrix, DVector};
@@ -49,20 +48,23 @@ impl Clusters {
         scratch: &mut FactorScratch,
     ) -> Self {
         let n = model.rest.len();
-        let elements = elements(model);
-        let count = count.min(elements.len()).max(1);
-        let (mut Y, mut T) = (vec![vec![Vec3::zeros(); n]; count], vec![0.0; count]);
         // By where they are: patches are not in the order of the sweep.
-        let place =
-            |e: &(Vec<(u32, Vec3)>, f64)| e.0.iter().map(|(n, _)| *n as usize).sum::<usize>() / e.0.len();
-        let mut order: Vec<usize> = (0..elements.len()).collect();
-        order.sort_by_key(|&e| place(&elements[e]));
-        for (k, &e) in order.iter().enumerate() {
-            let c = k * count / order.len();
-            let (corners, volume) = &elements[e];
+        let mut places = Vec::new();
+        model.for_each_solid(|nodes, _, _| {
+            places.push(nodes.iter().map(|&n| n as usize).sum::<usize>() / nodes.len());
+        });
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_by_key(|&e| places[e]);
+        let count = count.min(order.len()).max(1);
+        let mut cluster = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(k, &e)| cluster[e] = k * count / order.len());
+        let (mut Y, mut T) = (vec![vec![Vec3::zeros(); n]; count], vec![0.0; count]);
+        let mut clusters = cluster.into_iter();
+        model.for_each_solid(|nodes, gradients, volume| {
+            let Some(c) = clusters.next() else { return };
             T[c] += 2.0 * weight * volume;
-            corners.iter().for_each(|(n, g)| Y[c][*n as usize] += g * (weight * volume));
-        }
+            nodes.iter().zip(gradients).for_each(|(&n, g)| Y[c][n as usize] += g * (weight * volume));
+        });
         let moments = Y.clone();
         // Pinned nodes are no unknowns.
         Y.iter_mut().for_each(|y| pins.iter().for_each(|&p| y[p as usize] = Vec3::zeros()));
@@ -88,20 +90,6 @@ impl Clusters {
     pub fn bytes(&self) -> usize {
         (2 * self.Y.len() + self.Z.len()) * self.Y.first().map_or(0, |y| size_of_val(&y[..]))
     }
-}
-
-/// Nodes with gradients, and volumes, of whatever is solid in a body.
-fn elements(model: &DeformableModel) -> Vec<(Vec<(u32, Vec3)>, f64)> {
-    if model.is_smoothed() {
-        return model.patches.iter().collect();
-    }
-    let tetrahedra = model.tetrahedra.iter().enumerate().take(LANES * model.blocks.len());
-    let element = |(e, tet): (usize, &[u32; 4])| {
-        let block = &model.blocks[e / LANES];
-        let corners = tet.iter().copied().zip(block.shape_gradients(e % LANES)).collect();
-        (corners, block.volumes.0[e % LANES])
-    };
-    tetrahedra.map(element).collect()
 }
 
 impl TurnedClusters {

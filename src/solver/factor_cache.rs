@@ -8,6 +8,7 @@ use super::columns::Columns;
 use super::factor::{BATCH, Factor, FactorScratch, Symbolic};
 use super::operator::StiffnessOperator;
 use super::system::{self, FactorKey};
+use crate::body::constant::laplacian_weight;
 use crate::body::{DeformableBody, DeformableModel, Solver, SystemMatrix};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -148,7 +149,7 @@ impl FactorCache {
             work.factorizations = 1;
             let columns = Columns::new(&body.model.surface, key.system);
             let clusters = (key.clusters > 0).then(|| {
-                let weight = system::laplacian_weight(&body.material, h);
+                let weight = laplacian_weight(&body.material) * system::stiffening(&body.material, h);
                 let (pins, scratch) = (&key.pins, &mut self.scratch);
                 Clusters::new(&body.model, key.clusters, weight, pins, &symbolic, &factor, scratch)
             });

@@ -3,7 +3,7 @@
 
 use super::body_problem::BodyProblem;
 use super::factor_cache::SystemFactor;
-use crate::math::Vec3;
+use crate::math::{Vec3, dot};
 use std::collections::VecDeque;
 
 /// The pairs of one body within one step.
@@ -80,10 +80,6 @@ impl Lbfgs {
 fn difference(a: &[Vec3], b: &[Vec3], out: &mut Vec<Vec3>) {
     out.clear();
     out.extend(a.iter().zip(b).map(|(a, b)| a - b));
-}
-
-fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
 
 fn add(to: &mut [Vec3], what: &[Vec3], times: f64) {

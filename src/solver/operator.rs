@@ -1,12 +1,12 @@
 //! The constant matrix as what it does, element by element, without being put together: for conjugate gradients
 //! on bodies whose factor would not fit, or would be made anew all the time.
 
-use super::system::dimension;
-use crate::body::elastic::{Elements, add_linear_forces};
-use crate::body::tangent::{add_diagonal, add_thin_bounds};
+use super::system::{dimension, inertia, stiffening};
+use crate::body::constant::{add_blocks, subtract_product};
+use crate::body::elastic::Elements;
 use crate::body::{DeformableModel, SystemMatrix};
 use crate::material::DeformableMaterial;
-use crate::math::{Mat3, Vec3};
+use crate::math::{Mat3, Vec3, dot};
 use std::sync::Arc;
 
 /// `A v` for the matrix of [`super::system::assemble`].
@@ -48,20 +48,23 @@ impl StiffnessOperator {
         system: SystemMatrix,
         h: f64,
     ) -> Self {
-        let inertia = material.density * (1.0 + material.mass_damping * h) / (h * h);
+        let inertia = inertia(material, h);
         let mut operator = Self {
             model: model.clone(),
             material: *material,
             system,
-            stiffening: 1.0 + material.stiffness_damping / h,
+            stiffening: stiffening(material, h),
             inertia: model.node_volumes.iter().map(|v| inertia * v).collect(),
             pins: pins.to_vec(),
             inverse_diagonal: Vec::new(),
         };
         pins.iter().for_each(|&p| operator.inertia[p as usize] = 1.0);
         let mut diagonal = vec![Mat3::zeros(); model.rest.len()];
-        let is_laplacian = system == SystemMatrix::Laplacian;
-        add_diagonal(&operator.elements(), is_laplacian, &mut diagonal);
+        add_blocks(&operator.elements(), system, |i, j, block| {
+            if i == j {
+                diagonal[i] += block;
+            }
+        });
         pins.iter().for_each(|&p| diagonal[p as usize] = Mat3::zeros());
         let invert = |(d, m): (&Mat3, &f64)| {
             let block = d * operator.stiffening + Mat3::from_diagonal_element(*m);
@@ -83,8 +86,7 @@ impl StiffnessOperator {
     fn multiply(&self, v: &[Vec3], out: &mut Vec<Vec3>) {
         out.clear();
         out.resize(v.len(), Vec3::zeros());
-        add_linear_forces(&self.elements(), self.system == SystemMatrix::Laplacian, v, out);
-        add_thin_bounds(&self.elements(), |i, j, k| out[i] -= v[j] * k);
+        subtract_product(&self.elements(), self.system, v, out);
         self.pins.iter().for_each(|&p| out[p as usize] = Vec3::zeros());
         for ((out, v), m) in out.iter_mut().zip(v).zip(&self.inertia) {
             *out = v * *m - *out * self.stiffening;
@@ -131,8 +133,4 @@ impl StiffnessOperator {
             x.copy_from_slice(&s.as_slice()[..d]);
         }
     }
-}
-
-fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }

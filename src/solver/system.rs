@@ -7,12 +7,11 @@
 //! factor.
 
 use super::factor::Symbolic;
+use crate::body::constant::add_blocks;
 use crate::body::elastic::Elements;
-use crate::body::tangent::{add_tangents, add_thin_bounds};
+use crate::body::tangent::add_tangents;
 use crate::body::{DeformableBody, DeformableModel, FactorPrecision, Solver, SystemMatrix};
-use crate::energy::{ElementEnergy, with_energy};
 use crate::material::DeformableMaterial;
-use crate::math::lanes::LANES;
 use crate::math::{Mat3, Vec3};
 
 /// Everything a numeric factor depends on: it is valid for any body that agrees in all of it.
@@ -103,48 +102,20 @@ pub(crate) fn assemble(
     symbolic: &Symbolic,
 ) -> Vec<f64> {
     let mut matrix = Upper::new(model, material, pins, system, h, symbolic);
-    let stiffening = 1.0 + material.stiffness_damping / h;
-    let lame = material.lame();
-    let weight = with_energy!(material, energy => energy.laplacian_weight());
-    let mut add = |i: u32, j: u32, a: &Vec3, b: &Vec3, volume: f64| {
-        let stiffness = match system {
-            SystemMatrix::Laplacian => Mat3::from_diagonal_element(weight * a.dot(b)),
-            SystemMatrix::RestStiffness => {
-                (Mat3::from_diagonal_element(a.dot(b)) + b * a.transpose()) * lame.mu
-                    + a * b.transpose() * lame.lambda
-            }
-        };
-        matrix.add_elastic(i as usize, j as usize, &(stiffness * volume));
-    };
-    for (corners, volume) in model.patches.iter() {
-        for (i, a) in &corners {
-            for (j, b) in &corners {
-                add(*i, *j, a, b, volume * stiffening);
-            }
-        }
-    }
-    let solid = if model.is_smoothed() { 0 } else { LANES * model.blocks.len() };
-    for (e, tet) in model.tetrahedra.iter().enumerate().take(solid) {
-        let block = &model.blocks[e / LANES];
-        let g: [Vec3; 4] = block.shape_gradients(e % LANES);
-        let volume = block.volumes.0[e % LANES] * stiffening;
-        for a in 0..4 {
-            for b in 0..4 {
-                add(tet[a], tet[b], &g[a], &g[b], volume);
-            }
-        }
-    }
+    let stiffening = stiffening(material, h);
     let elements = Elements { model, material, activation: 1.0 };
-    add_thin_bounds(&elements, |i, j, k| {
-        matrix.add_elastic(i, j, &Mat3::from_diagonal_element(k * stiffening));
-    });
+    add_blocks(&elements, system, |i, j, block| matrix.add_elastic(i, j, &(block * stiffening)));
     matrix.values
 }
 
-/// Weight of the Laplacian of a material's solids \[Pa\], damping included.
-pub(crate) fn laplacian_weight(material: &DeformableMaterial, h: f64) -> f64 {
-    let stiffening = 1.0 + material.stiffness_damping / h;
-    with_energy!(material, energy => energy.laplacian_weight()) * stiffening
+/// Factor of stiffness damping on the elastic part of the matrix, 1 + β/h.
+pub(crate) fn stiffening(material: &DeformableMaterial, h: f64) -> f64 {
+    1.0 + material.stiffness_damping / h
+}
+
+/// Inertia per volume in the matrix, (1 + αh) ρ/h² [N/m per m³].
+pub(crate) fn inertia(material: &DeformableMaterial, h: f64) -> f64 {
+    material.density * (1.0 + material.mass_damping * h) / (h * h)
 }
 
 /// The values of a body's Hessian at `x`, in the order of [`Symbolic::rows`], of `3n` unknowns. Of stiffness
@@ -159,7 +130,7 @@ pub(crate) fn assemble_tangent(
 ) -> Vec<f64> {
     let Elements { model, material, .. } = elements;
     let mut matrix = Upper::new(model, material, pins, SystemMatrix::RestStiffness, h, symbolic);
-    let stiffening = 1.0 + material.stiffness_damping / h;
+    let stiffening = stiffening(material, h);
     add_tangents(elements, x, projected, |i, j, block| matrix.add_elastic(i, j, &(block * stiffening)));
     matrix.values
 }
@@ -228,7 +199,7 @@ impl<'a> Upper<'a> {
         pins.iter().for_each(|&p| pinned[p as usize] = true);
         let values = vec![0.0; symbolic.rows().len()];
         let mut matrix = Self { symbolic, values, pinned, d: dimension(system) };
-        let inertia = material.density * (1.0 + material.mass_damping * h) / (h * h);
+        let inertia = inertia(material, h);
         for (j, &volume) in model.node_volumes.iter().enumerate() {
             let diagonal = if matrix.pinned[j] { 1.0 } else { inertia * volume };
             matrix.add(j, j, &Mat3::from_diagonal_element(diagonal));
