@@ -4,18 +4,21 @@
 //! worth, and parallelism is over bodies. Everything works in memory the caller owns.
 
 use super::operator::{ConjugateScratch, StiffnessOperator};
+use super::supernodes::{Entry, Supernodes};
 use super::sweeps::UpperTriangle;
-use super::triangular::{Entry, Supernodes, Values};
+use crate::math::lanes::Lane;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::perm::PermRef;
 use faer::reborrow::ReborrowMut;
-use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
+use faer::sparse::linalg::{SupernodalThreshold, amd};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Accum, MatMut, MatRef, Par, Side, Spec};
 
@@ -23,13 +26,15 @@ use faer::{Accum, MatMut, MatRef, Par, Side, Spec};
 /// bits whichever batch it comes from.
 pub(crate) const BATCH: usize = 24;
 
-/// Sparsity of a symmetric matrix (upper triangle by columns) and of its factor.
+/// Sparsity of a symmetric matrix over nodes (upper triangle by columns) and of its factor.
 #[derive(Debug)]
 pub(crate) struct Symbolic {
+    /// Unknowns per node.
+    d: usize,
     /// None of a matrix that is not put together.
     analysis: Option<(SymbolicSparseColMat<usize>, SymbolicCholesky<usize>)>,
     supernodes: Supernodes,
-    /// Old index at each new place, and the other way round.
+    /// Old node at each new place, and the other way round.
     order: Vec<usize>,
     places: Vec<usize>,
 }
@@ -37,10 +42,10 @@ pub(crate) struct Symbolic {
 /// A numeric factor `A = L Lᵀ`. Solves are in double precision with either.
 #[derive(Debug)]
 pub(crate) enum Factor {
-    Double(Values<f64>),
+    Double(Vec<f64>),
     /// Computed in double precision, then rounded: what it solves is a matrix that differs from A by
     /// 6e-8 of its norm, with half the bytes to read.
-    Single(Values<f32>),
+    Single(Vec<f32>),
     /// No factor but what stands in for one.
     Jacobi(Vec<f64>),
     /// The matrix itself, with a sweep of Gauss–Seidel for its inverse.
@@ -53,7 +58,7 @@ impl Factor {
     /// The same in single precision.
     pub fn rounded(self) -> Self {
         match self {
-            Self::Double(values) => Self::Single(values.rounded()),
+            Self::Double(values) => Self::Single(values.into_iter().map(|v| v as f32).collect()),
             other => other,
         }
     }
@@ -65,9 +70,10 @@ impl Factor {
 
     pub fn bytes(&self) -> usize {
         match self {
-            Self::Double(values) => values.bytes(),
-            Self::Single(values) => values.bytes(),
-            Self::Jacobi(values) | Self::GaussSeidel(values) => size_of_val(values.as_slice()),
+            Self::Single(values) => size_of_val(values.as_slice()),
+            Self::Double(values) | Self::Jacobi(values) | Self::GaussSeidel(values) => {
+                size_of_val(values.as_slice())
+            }
             Self::Iterative(operator) => operator.bytes(),
         }
     }
@@ -89,30 +95,43 @@ pub(crate) struct FactorScratch {
 pub(crate) struct NotPositiveDefinite;
 
 impl Symbolic {
-    /// `column_starts` (n + 1) and ascending `rows` of the upper triangle, diagonal included. Ordered
-    /// by approximate minimum degree [Amestoy et al. 1996]: half the fill of nested dissection by
-    /// coordinates on slender and chunky lattices alike.
-    pub fn new(n: usize, column_starts: Vec<usize>, rows: Vec<usize>) -> Option<Self> {
-        let pattern = SymbolicSparseColMat::new_checked(n, n, column_starts, None, rows);
+    /// The pattern over nodes, with `starts` (n + 1) of its columns and ascending `rows` of the upper triangle,
+    /// diagonal included; every entry is a block of `d` unknowns squared. Ordered by approximate minimum degree
+    /// [Amestoy et al. 1996]: half the fill of nested dissection by coordinates on slender and chunky
+    /// lattices alike.
+    pub fn new(d: usize, starts: Vec<usize>, rows: Vec<usize>) -> Option<Self> {
+        let n = starts.len() - 1;
+        let (mut column_starts, mut all_rows) = (vec![0], Vec::new());
+        for (i, column) in starts.windows(2).enumerate() {
+            let above = &rows[column[0]..column[1] - 1];
+            for r in 0..d {
+                all_rows.extend(above.iter().flat_map(|&j| d * j..d * (j + 1)));
+                all_rows.extend(d * i..=d * i + r);
+                column_starts.push(all_rows.len());
+            }
+        }
+        let (order, places) = ordering(SymbolicSparseColMat::new_checked(n, n, starts, None, rows))?;
+        let spread = |of: &[usize]| -> Vec<usize> { of.iter().flat_map(|&i| d * i..d * (i + 1)).collect() };
+        let (all_order, all_places) = (spread(&order), spread(&places));
+        let pattern = SymbolicSparseColMat::new_checked(d * n, d * n, column_starts, None, all_rows);
         let cholesky = factorize_symbolic_cholesky(
             pattern.as_ref(),
             Side::Upper,
-            SymmetricOrdering::Amd,
+            SymmetricOrdering::Custom(PermRef::new_checked(&all_order, &all_places, d * n)),
             CholeskySymbolicParams {
                 supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
                 ..Default::default()
             },
         );
         let cholesky = cholesky.ok()?;
-        let supernodes = supernodes_of(&cholesky);
-        let (order, places) = cholesky.perm().map(|p| p.arrays()).map(|(o, p)| (o.to_vec(), p.to_vec()))?;
-        Some(Self { analysis: Some((pattern, cholesky)), supernodes, order, places })
+        let supernodes = supernodes_of(&cholesky, d)?;
+        Some(Self { d, analysis: Some((pattern, cholesky)), supernodes, order, places })
     }
 
-    /// Of `n` unknowns in their own order, without a matrix.
-    pub fn without_matrix(n: usize) -> Self {
+    /// Of `n` nodes in their own order, without a matrix.
+    pub fn without_matrix(d: usize, n: usize) -> Self {
         let order: Vec<usize> = (0..n).collect();
-        Self { analysis: None, supernodes: Supernodes::default(), places: order.clone(), order }
+        Self { d, analysis: None, supernodes: Supernodes::new(d), places: order.clone(), order }
     }
 
     pub fn column_starts(&self) -> &[usize] {
@@ -125,7 +144,7 @@ impl Symbolic {
 
     /// Numbers in a numeric factor.
     pub fn factor_len(&self) -> usize {
-        self.analysis.as_ref().map_or(0, |(_, cholesky)| cholesky.len_val())
+        self.supernodes.len()
     }
 
     /// Factors the matrix with these `values`, in the order of [`Symbolic::rows`].
@@ -149,25 +168,61 @@ impl Symbolic {
                 Spec::default(),
             )
             .map_err(|_| NotPositiveDefinite)?;
-        Ok(Factor::Double(Values::new(factor, &self.supernodes)))
+        Ok(Factor::Double(self.packed(&mut factor, &mut scratch.panel)))
     }
 
-    /// Place of each unknown in the order of elimination.
+    /// The numbers as solves want them, from faer's `[T; B]` of every supernode, which is overwritten.
+    fn packed(&self, factor: &mut [f64], inverse: &mut Vec<f64>) -> Vec<f64> {
+        let mut values = vec![0.0; self.supernodes.len()];
+        let mut rest = factor;
+        for s in 0..self.supernodes.count() {
+            let (own, rows) = self.supernodes.nodes(s);
+            let (n, m) = (self.d * own.len(), self.d * (own.len() + rows.len()));
+            let (panel, after) = rest.split_at_mut(m * n);
+            rest = after;
+            let M = MatMut::from_column_major_slice_mut(panel, m, n);
+            let (mut triangle, mut below) = M.split_at_row_mut(n);
+            // X T = −B.
+            let right = below.rb_mut().transpose_mut();
+            solve_upper_triangular_in_place(triangle.as_ref().transpose(), right, Par::Seq);
+            below.col_iter_mut().for_each(|column| column.iter_mut().for_each(|v| *v = -*v));
+            inverse.clear();
+            inverse.resize(n * n, 0.0);
+            let mut inverted = MatMut::from_column_major_slice_mut(inverse, n, n);
+            invert_lower_triangular(inverted.rb_mut(), triangle.as_ref(), Par::Seq);
+            triangle.copy_from(inverted);
+            self.supernodes.pack(s, panel, &mut values);
+        }
+        values
+    }
+
+    /// Place of each node in the order of elimination.
     pub fn places(&self) -> &[usize] {
         &self.places
     }
 
-    /// Solves `A x = b` in place, for a right-hand side in the order of elimination.
-    pub fn solve(&self, factor: &Factor, x: &mut [f64], scratch: &mut FactorScratch) {
+    /// Solves `A x = b` in place for the three numbers of every node, in the order of elimination; with one
+    /// unknown per node these are three right-hand sides.
+    pub fn solve(&self, factor: &Factor, x: &mut [Lane], scratch: &mut FactorScratch) {
         match factor {
-            Factor::Double(values) => self.supernodes.solve(values, x, &mut scratch.gathered),
-            Factor::Single(values) => self.supernodes.solve(values, x, &mut scratch.gathered),
+            Factor::Double(values) => self.supernodes.solve(values, x),
+            Factor::Single(values) => self.supernodes.solve(values, x),
             _ => {
                 let mut own = std::mem::take(&mut scratch.ordered);
-                own.clear();
-                own.extend(self.places.iter().map(|&place| x[place]));
-                self.solve_without(factor, &mut own, scratch);
-                self.places.iter().zip(&own).for_each(|(&place, v)| x[place] = *v);
+                // Axes of one right-hand side, and right-hand sides.
+                for axes in [0, 1, 2].chunks(self.d) {
+                    own.clear();
+                    own.extend(
+                        self.places
+                            .iter()
+                            .flat_map(|&place| axes.iter().map(move |&c| (place, c)))
+                            .map(|(place, c)| x[place].0[c]),
+                    );
+                    self.solve_without(factor, &mut own, scratch);
+                    for (&place, own) in self.places.iter().zip(own.chunks_exact(self.d)) {
+                        axes.iter().zip(own).for_each(|(&c, v)| x[place].0[c] = *v);
+                    }
+                }
                 scratch.ordered = own;
             }
         }
@@ -191,7 +246,8 @@ impl Symbolic {
     /// Solves for many columns at once, one after the other in their own order, of which most numbers may
     /// be zero.
     pub fn solve_batch(&self, factor: &Factor, rhs: &mut [f64], columns: usize, scratch: &mut FactorScratch) {
-        let n = self.order.len();
+        let d = self.d;
+        let n = d * self.order.len();
         if !matches!(factor, Factor::Double(_) | Factor::Single(_)) {
             for column in rhs.chunks_exact_mut(n).filter(|c| c.iter().any(|v| *v != 0.0)) {
                 self.solve_without(factor, column, scratch);
@@ -201,16 +257,16 @@ impl Symbolic {
         let mut ordered = std::mem::take(&mut scratch.ordered);
         ordered.clear();
         for column in rhs.chunks_exact(n) {
-            ordered.extend(self.order.iter().map(|&old| column[old]));
+            ordered.extend(self.order.iter().flat_map(|&old| &column[d * old..d * (old + 1)]));
         }
         match factor {
-            Factor::Double(values) => self.solve_panels(&values.L, &mut ordered, columns, scratch),
-            Factor::Single(values) => self.solve_panels(&values.L, &mut ordered, columns, scratch),
+            Factor::Double(values) => self.solve_panels(values, &mut ordered, columns, scratch),
+            Factor::Single(values) => self.solve_panels(values, &mut ordered, columns, scratch),
             _ => {}
         }
         for (column, x) in rhs.chunks_exact_mut(n).zip(ordered.chunks_exact(n)) {
-            for (&old, x) in self.order.iter().zip(x) {
-                column[old] = *x;
+            for (&old, x) in self.order.iter().zip(x.chunks_exact(d)) {
+                column[d * old..d * (old + 1)].copy_from_slice(x);
             }
         }
         scratch.ordered = ordered;
@@ -223,71 +279,75 @@ impl Symbolic {
         columns: usize,
         scratch: &mut FactorScratch,
     ) {
-        let n = self.order.len();
-        let count = self.supernodes.begin.len() - 1;
+        let d = self.d;
+        let n = d * self.order.len();
+        let count = self.supernodes.count();
         let FactorScratch { gathered, panel, .. } = scratch;
         let places = (0..count).map(|s| (s, true)).chain((0..count).rev().map(|s| (s, false)));
         for (s, forward) in places {
-            let (own, rows, L) = self.supernodes.parts(s, values);
+            let (own, rows) = self.supernodes.nodes(s);
+            let m = d * (own.len() + rows.len());
+            let own = d * own.start..d * own.end;
             // Where a right-hand side is still zero, so is the solution.
             if forward && (0..columns).all(|c| x[c * n..][own.clone()].iter().all(|v| *v == 0.0)) {
                 continue;
             }
-            panel.clear();
-            panel.extend(L.iter().map(|&l| l.into()));
-            let L = MatRef::from_column_major_slice(panel, own.len() + rows.len(), own.len());
-            let (triangle, below) = L.split_at_row(own.len());
+            self.supernodes.unpack(s, values, panel);
+            let M = MatRef::from_column_major_slice(panel, m, own.len());
             gathered.clear();
             if forward {
-                gathered.resize(rows.len() * columns, 0.0);
-                let mut X = MatMut::from_column_major_slice_mut(x, n, columns);
-                let mut top = X.rb_mut().subrows_mut(own.start, own.len());
-                solve_lower_triangular_in_place(triangle, top.rb_mut(), Par::Seq);
-                let product = MatMut::from_column_major_slice_mut(gathered, rows.len(), columns);
-                matmul(product, Accum::Replace, below, top, 1.0, Par::Seq);
-                for (g, x) in gathered.chunks_exact(rows.len().max(1)).zip(x.chunks_exact_mut(n)) {
-                    rows.iter().zip(g).for_each(|(&row, g)| x[row] -= g);
+                gathered.resize(m * columns, 0.0);
+                let top = MatRef::from_column_major_slice(x, n, columns).subrows(own.start, own.len());
+                let product = MatMut::from_column_major_slice_mut(gathered, m, columns);
+                matmul(product, Accum::Replace, M, top, 1.0, Par::Seq);
+                for (g, x) in gathered.chunks_exact(m).zip(x.chunks_exact_mut(n)) {
+                    let (top, below) = g.split_at(own.len());
+                    x[own.clone()].copy_from_slice(top);
+                    for (&row, g) in rows.iter().zip(below.chunks_exact(d)) {
+                        x[d * row..].iter_mut().zip(g).for_each(|(x, g)| *x += g);
+                    }
                 }
             } else {
                 for x in x.chunks_exact(n) {
-                    gathered.extend(rows.iter().map(|&row| x[row]));
+                    gathered.extend_from_slice(&x[own.clone()]);
+                    gathered.extend(rows.iter().flat_map(|&row| &x[d * row..d * (row + 1)]));
                 }
+                let known = MatRef::from_column_major_slice(gathered, m, columns);
                 let mut X = MatMut::from_column_major_slice_mut(x, n, columns);
-                let mut top = X.rb_mut().subrows_mut(own.start, own.len());
-                let known = MatRef::from_column_major_slice(gathered, rows.len(), columns);
-                matmul(top.rb_mut(), Accum::Add, below.transpose(), known, -1.0, Par::Seq);
-                solve_upper_triangular_in_place(triangle.transpose(), top, Par::Seq);
+                let top = X.rb_mut().subrows_mut(own.start, own.len());
+                matmul(top, Accum::Replace, M.transpose(), known, 1.0, Par::Seq);
             }
         }
     }
 }
 
-/// Where faer keeps the columns of a factor. A factor without structure to speak of is simplicial:
-/// every column is a supernode of its own then.
-fn supernodes_of(cholesky: &SymbolicCholesky<usize>) -> Supernodes {
-    let n = cholesky.nrows();
-    let mut supernodes = Supernodes { row_begin: vec![0], ..Supernodes::default() };
-    match cholesky.raw() {
-        SymbolicCholeskyRaw::Supernodal(raw) => {
-            supernodes.begin.extend_from_slice(&raw.supernode_begin()[..raw.n_supernodes()]);
-            supernodes.value_begin.extend_from_slice(raw.col_ptr_for_val());
-            for s in 0..raw.n_supernodes() {
-                supernodes.rows.extend_from_slice(raw.supernode(s).pattern());
-                supernodes.row_begin.push(supernodes.rows.len());
-            }
+/// Old node at each new place, and the other way round, for the upper triangle of a pattern.
+fn ordering(pattern: SymbolicSparseColMat<usize>) -> Option<(Vec<usize>, Vec<usize>)> {
+    let n = pattern.ncols();
+    let (mut order, mut places) = (vec![0; n], vec![0; n]);
+    let need = amd::order_maybe_unsorted_scratch::<usize>(n, pattern.compute_nnz());
+    let mut buffer = MemBuffer::new(need);
+    let stack = MemStack::new(&mut buffer);
+    amd::order_maybe_unsorted(&mut order, &mut places, pattern.as_ref(), Default::default(), stack).ok()?;
+    Some((order, places))
+}
+
+/// Where faer keeps the columns of a factor, in nodes of `d` unknowns. The unknowns of a node have the same pattern
+/// and are eliminated together, so supernodes are of whole nodes; `None` if they were not.
+fn supernodes_of(cholesky: &SymbolicCholesky<usize>, d: usize) -> Option<Supernodes> {
+    let SymbolicCholeskyRaw::Supernodal(raw) = cholesky.raw() else { return None };
+    let mut supernodes = Supernodes::new(d);
+    let begin = &raw.supernode_begin()[..raw.n_supernodes()];
+    for (s, end) in begin.iter().copied().chain([cholesky.nrows()]).skip(1).enumerate() {
+        let nodes = raw.supernode(s).pattern().chunks(d);
+        let is_whole =
+            |node: &[usize]| node[0].is_multiple_of(d) && node.iter().copied().eq(node[0]..node[0] + d);
+        if !end.is_multiple_of(d) || !nodes.clone().all(is_whole) {
+            return None;
         }
-        SymbolicCholeskyRaw::Simplicial(raw) => {
-            supernodes.begin.extend(0..n);
-            supernodes.value_begin.extend_from_slice(raw.col_ptr());
-            for column in raw.col_ptr().windows(2) {
-                // The diagonal stands first.
-                supernodes.rows.extend_from_slice(&raw.row_idx()[column[0] + 1..column[1]]);
-                supernodes.row_begin.push(supernodes.rows.len());
-            }
-        }
+        supernodes.push(end / d, nodes.map(|node| node[0] / d));
     }
-    supernodes.begin.push(n);
-    supernodes
+    Some(supernodes)
 }
 
 impl FactorScratch {
@@ -346,41 +406,45 @@ mod tests {
     proptest! {
         #[test]
         fn factors_solve_what_they_were_made_of(
-            n in 1usize..40, seed in proptest::collection::vec(-1.0..1.0f64, 200), columns in 1usize..4,
+            nodes in 1usize..40, d in prop_oneof![Just(1usize), Just(3)], columns in 1usize..4,
+            seed in proptest::collection::vec(-1.0..1.0f64, 200),
         ) {
-            // Diagonally dominant with a few entries off the diagonal.
-            let entry = |i: usize, j: usize| match (i - j) * 7 % 5 {
-                0 | 2 => seed[(i * 13 + j * 31) % seed.len()],
+            // Diagonally dominant with a few blocks off the diagonal, each as good as full.
+            let n = d * nodes;
+            let coupled = |i: usize, j: usize| i == j || matches!(i.abs_diff(j) * 7 % 5, 0 | 2);
+            let at = |i: usize, j: usize| match (coupled(i / d, j / d), i == j) {
+                (true, true) => 40.0 * d as f64,
+                (true, false) => seed[(i.max(j) * 13 + i.min(j) * 31) % seed.len()],
                 _ => 0.0,
             };
-            let at = |i: usize, j: usize| if i == j { 40.0 } else { entry(i.max(j), i.min(j)) };
-            let (mut starts, mut rows, mut values) = (vec![0], vec![], vec![]);
-            for j in 0..n {
-                for i in 0..=j {
-                    if i == j || entry(j, i) != 0.0 {
-                        rows.push(i);
-                        values.push(at(i, j));
-                    }
-                }
+            let (mut starts, mut rows) = (vec![0], vec![]);
+            for j in 0..nodes {
+                rows.extend((0..=j).filter(|&i| coupled(i, j)));
                 starts.push(rows.len());
             }
-            let x: Vec<f64> = (0..n * columns).map(|k| seed[(k * 3) % seed.len()]).collect();
-            let b: Vec<f64> = (0..n * columns)
-                .map(|k| (0..n).map(|j| at(k % n, j) * x[k / n * n + j]).sum())
-                .collect();
             let mut scratch = FactorScratch::default();
-            let symbolic = Symbolic::new(n, starts, rows).unwrap();
+            let symbolic = Symbolic::new(d, starts, rows).unwrap();
+            let places = symbolic.column_starts().windows(2).enumerate().flat_map(|(j, w)| (w[0]..w[1]).map(move |k| (j, k)));
+            let values: Vec<f64> = places.map(|(j, k)| at(symbolic.rows()[k], j)).collect();
             let factor = symbolic.factorize(&values, &mut scratch).unwrap();
-            let mut sparse = vec![0.0; n * columns];
-            for (x, b) in sparse.chunks_exact_mut(n).zip(b.chunks_exact(n)) {
-                let mut ordered = vec![0.0; n];
-                (0..n).for_each(|i| ordered[symbolic.places()[i]] = b[i]);
-                symbolic.solve(&factor, &mut ordered, &mut scratch);
-                (0..n).for_each(|i| x[i] = ordered[symbolic.places()[i]]);
-            }
+            let x: Vec<f64> = (0..n * 3 * columns).map(|k| seed[(k * 3) % seed.len()]).collect();
+            let b: Vec<f64> =
+                (0..x.len()).map(|k| (0..n).map(|j| at(k % n, j) * x[k / n * n + j]).sum()).collect();
             let mut batch = b.clone();
-            symbolic.solve_batch(&factor, &mut batch, columns, &mut scratch);
-            for k in 0..n * columns { prop_assert!((sparse[k] - x[k]).abs() < 1e-13 && (batch[k] - x[k]).abs() < 1e-13); }
+            symbolic.solve_batch(&factor, &mut batch, 3 * columns, &mut scratch);
+            let mut single = vec![0.0; x.len()];
+            // With one unknown per node three right-hand sides go together.
+            let together = n * 3 / d;
+            for (out, b) in single.chunks_exact_mut(together).zip(b.chunks_exact(together)) {
+                let mut ordered = vec![Lane::default(); nodes];
+                let at = |i: usize, c: usize| if d == 3 { 3 * i + c } else { n * c + i };
+                (0..nodes).for_each(|i| (0..3).for_each(|c| ordered[symbolic.places()[i]].0[c] = b[at(i, c)]));
+                symbolic.solve(&factor, &mut ordered, &mut scratch);
+                (0..nodes).for_each(|i| (0..3).for_each(|c| out[at(i, c)] = ordered[symbolic.places()[i]].0[c]));
+            }
+            for k in 0..x.len() {
+                prop_assert!((single[k] - x[k]).abs() < 1e-13 && (batch[k] - x[k]).abs() < 1e-13);
+            }
         }
     }
 }

@@ -115,10 +115,12 @@ impl FactorCache {
             let symbolic = match self.symbolic.get(&name) {
                 Some(symbolic) => symbolic.clone(),
                 None => {
-                    let unknowns = system::dimension(key.system) * body.model.rest.len();
                     let made = match has_matrix {
                         true => system::symbolic(&body.model, key.system)?,
-                        false => Symbolic::without_matrix(unknowns),
+                        false => {
+                            let d = system::dimension(key.system);
+                            Symbolic::without_matrix(d, body.model.rest.len())
+                        }
                     };
                     let made = Arc::new(made);
                     self.symbolic.insert(name, made.clone());

@@ -11,9 +11,9 @@ use super::clusters::TurnedClusters;
 use super::effort::Effort;
 use super::factor::FactorScratch;
 use super::factor_cache::SystemFactor;
-use super::system::dimension;
 use crate::body::elastic::node_rotations;
 use crate::body::{DeformableModel, SystemMatrix};
+use crate::math::lanes::Lane;
 use crate::math::{Mat3, Vec3, rounded_rotation};
 use std::time::Instant;
 
@@ -30,7 +30,7 @@ pub(crate) struct Metric {
     clusters: TurnedClusters,
     /// The clusters take part.
     turns: bool,
-    rhs: Vec<f64>,
+    rhs: Vec<Lane>,
     balanced: Vec<Vec3>,
     scratch: FactorScratch,
     /// Of the solves.
@@ -193,30 +193,22 @@ impl Metric {
     /// `out = Q A⁻¹ Qᵀ r`.
     fn rotate_and_solve(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
         let start = Instant::now();
-        let n = r.len();
         let Self { rhs, scratch, .. } = self;
-        let (symbolic, places) = (&factor.symbolic, factor.symbolic.places());
         match (factor.system, self.kind) {
             (SystemMatrix::Laplacian, _) => {
-                rhs.resize(n, 0.0);
-                for c in 0..3 {
-                    r.iter().zip(places).for_each(|(r, &place)| rhs[place] = r[c]);
-                    symbolic.solve(&factor.factor, rhs, scratch);
-                    out.iter_mut().zip(places).for_each(|(out, &place)| out[c] = rhs[place]);
-                }
+                solve_turned(factor, |_, v| v, |_, v| v, r, out, rhs, scratch);
             }
             (SystemMatrix::RestStiffness, FrameKind::PerNode) => {
                 let frames = &self.per_node;
-                solve_turned(factor, |i| &frames[i], r, out, rhs, scratch);
+                solve_turned(factor, |i, v| frames[i].tr_mul(&v), |i, v| frames[i] * v, r, out, rhs, scratch);
             }
             (SystemMatrix::RestStiffness, _) => {
                 let frame = &self.floating;
-                solve_turned(factor, |_| frame, r, out, rhs, scratch);
+                solve_turned(factor, |_, v| frame.tr_mul(&v), |_, v| frame * v, r, out, rhs, scratch);
             }
         }
-        let right_hand_sides = 3 / dimension(factor.system);
         self.effort.solves += 1;
-        self.effort.solve_bytes += 2 * right_hand_sides * factor.factor.bytes();
+        self.effort.solve_bytes += 2 * factor.factor.bytes();
         self.effort.linear_time += start.elapsed();
     }
 
@@ -264,23 +256,25 @@ impl Metric {
     }
 }
 
-/// `out = Q A⁻¹ Qᵀ r` with a frame per node.
-fn solve_turned<'a>(
+/// `out = Q A⁻¹ Qᵀ r`, node by node: `turn_back` is Qᵀ, `turn` is Q.
+fn solve_turned(
     factor: &SystemFactor,
-    frame: impl Fn(usize) -> &'a Mat3,
+    turn_back: impl Fn(usize, Vec3) -> Vec3,
+    turn: impl Fn(usize, Vec3) -> Vec3,
     r: &[Vec3],
     out: &mut [Vec3],
-    rhs: &mut Vec<f64>,
+    rhs: &mut Vec<Lane>,
     scratch: &mut FactorScratch,
 ) {
-    rhs.resize(3 * r.len(), 0.0);
+    rhs.resize(r.len(), Lane::default());
     let places = factor.symbolic.places();
-    for (i, (r, places)) in r.iter().zip(places.chunks_exact(3)).enumerate() {
-        let turned = frame(i).tr_mul(r);
-        (0..3).for_each(|c| rhs[places[c]] = turned[c]);
+    for (i, (r, &place)) in r.iter().zip(places).enumerate() {
+        let turned = turn_back(i, *r);
+        rhs[place] = Lane([turned.x, turned.y, turned.z, 0.0]);
     }
     factor.symbolic.solve(&factor.factor, rhs, scratch);
-    for (i, (out, places)) in out.iter_mut().zip(places.chunks_exact(3)).enumerate() {
-        *out = frame(i) * Vec3::new(rhs[places[0]], rhs[places[1]], rhs[places[2]]);
+    for (i, (out, &place)) in out.iter_mut().zip(places).enumerate() {
+        let [x, y, z, _] = rhs[place].0;
+        *out = turn(i, Vec3::new(x, y, z));
     }
 }

@@ -25,12 +25,12 @@ mod metric;
 mod operator;
 mod partner;
 mod starting;
+mod supernodes;
 mod sweeps;
 mod system;
 mod tangent;
 #[cfg(test)]
 mod tests;
-mod triangular;
 
 pub(crate) use body_problem::{BodyProblem, SECOND_ORDER};
 pub(crate) use contact_system::ContactLimits;

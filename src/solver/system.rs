@@ -77,19 +77,13 @@ pub(crate) fn dimension(system: SystemMatrix) -> usize {
 
 /// The sparsity of a body's matrix.
 pub(crate) fn symbolic(model: &DeformableModel, system: SystemMatrix) -> Option<Symbolic> {
-    let d = dimension(system);
-    let n = model.rest.len();
     let (mut starts, mut rows) = (vec![0], Vec::new());
-    for i in 0..n {
-        let above = model.coupling[i].iter().map(|&j| j as usize).filter(|&j| j < i);
-        let above: Vec<usize> = above.collect();
-        for r in 0..d {
-            rows.extend(above.iter().flat_map(|&j| (0..d).map(move |c| d * j + c)));
-            rows.extend((0..=r).map(|c| d * i + c));
-            starts.push(rows.len());
-        }
+    for i in 0..model.rest.len() {
+        rows.extend(model.coupling[i].iter().map(|&j| j as usize).filter(|&j| j < i));
+        rows.push(i);
+        starts.push(rows.len());
     }
-    Symbolic::new(d * n, starts, rows)
+    Symbolic::new(dimension(system), starts, rows)
 }
 
 /// The values of a body's constant matrix, in the order of [`Symbolic::rows`].
