@@ -89,9 +89,13 @@ impl BlockMatrix {
         for (k, &(i, j)) in self.pattern.pairs.iter().enumerate() {
             let (rows, columns) = (self.pattern.range(i), self.pattern.range(j));
             let block = self.block(k);
-            dense::add_product(block, &v[columns.clone()], &mut out[rows.clone()]);
-            if i != j {
-                dense::add_transposed_product(block, &v[rows], &mut out[columns]);
+            if i == j {
+                dense::add_symmetric_product(block, &v[rows.clone()], &mut out[rows]);
+            } else {
+                // Column by column of the lower triangle: the rows come after the columns.
+                let (above, below) = out.split_at_mut(rows.start);
+                let below = &mut below[..rows.len()];
+                dense::add_both_products(block, &v[columns.clone()], &v[rows], &mut above[columns], below);
             }
         }
     }

@@ -59,6 +59,9 @@ impl ConeHessian {
     /// Factors the matrix, unless it is the one that was factored last; tells whether it had to, or
     /// `None` if that failed.
     pub fn factorize(&mut self, problem: &ConeProblem) -> Option<bool> {
+        if self.order() == 0 {
+            return Some(false);
+        }
         if let Some(f) = &self.factored {
             let same = f.version == problem.version && f.offsets == self.offsets && f.columns == self.columns;
             if same {
@@ -92,6 +95,47 @@ impl ConeHessian {
             }
         }
         self.reduced = reduced;
+    }
+
+    /// Appends to `out` the way from z to the solution of `z = LLᵀR u(z) + c`, given u at z, if z is `L y + c`: then
+    /// `(I + LᵀWL) dy = LᵀR u − y`, and no product with W is needed. False where z is not.
+    pub fn solve_within(
+        &mut self,
+        problem: &ConeProblem,
+        u: &[f64],
+        R: &[f64],
+        z: &[f64],
+        constant: impl Fn(usize) -> f64,
+        out: &mut Vec<f64>,
+    ) -> bool {
+        let mut reduced = std::mem::take(&mut self.reduced);
+        reduced.clear();
+        let is_within = (0..problem.contacts()).all(|i| {
+            let rows = problem.offsets[i]..problem.offsets[i + 1];
+            let (u, z) = (spatial(&u[rows.clone()]), spatial(&z[rows]));
+            let mut left = [z[0] - constant(i), z[1], z[2]];
+            for column in self.columns_of(i) {
+                // The columns of a contact are orthogonal.
+                let y = dot(column, &left) / dot(column, column);
+                (0..3).for_each(|k| left[k] -= y * column[k]);
+                reduced.push(R[i] * dot(column, &u) - y);
+            }
+            dot(&left, &left) <= (4.0 * f64::EPSILON).powi(2) * dot(&z, &z)
+        });
+        if is_within {
+            if self.order() > 0 {
+                self.factor.solve(&mut reduced);
+            }
+            for i in 0..problem.contacts() {
+                let mut force = [0.0; 3];
+                for (column, k) in self.columns_of(i).iter().zip(self.offsets[i]..) {
+                    (0..3).for_each(|axis| force[axis] += column[axis] * reduced[k]);
+                }
+                out.extend_from_slice(&force[..problem.offsets[i + 1] - problem.offsets[i]]);
+            }
+        }
+        self.reduced = reduced;
+        is_within
     }
 
     fn assemble(&mut self, problem: &ConeProblem) {

@@ -95,13 +95,23 @@ impl ConeProblem {
 }
 
 impl ConeSolver {
-    /// Tells where the contacts are expected to end: as they were left, with slips of σ/μ.
-    pub fn expect(&mut self, problem: &ConeProblem, lambda: &[f64], shift: &[f64]) {
+    /// Tells where the contacts are expected to end: as they were left, with slips of σ/μ; those without a force
+    /// where they are now, at a gap of `end` \[m\].
+    pub fn expect(
+        &mut self,
+        problem: &ConeProblem,
+        lambda: &[f64],
+        shift: &[f64],
+        end: impl Fn(usize) -> f64,
+    ) {
         self.set_regularisation(problem, EPSILON);
         self.expected.clear();
         self.expected.extend_from_slice(lambda);
         for (i, law) in problem.laws.iter().enumerate() {
             let force = &mut self.expected[problem.offsets[i]..problem.offsets[i + 1]];
+            if matches!(law, Law::Contact { .. }) && force[0] == 0.0 {
+                force[0] = -end(i) / self.R[i];
+            }
             let (Law::Contact { friction: mu }, [normal, a, b]) = (law, force) else { continue };
             let friction = a.hypot(*b);
             if *normal > 0.0 && shift[i] > 0.0 && friction > 0.0 {
@@ -150,11 +160,23 @@ impl ConeSolver {
         if !done {
             work.failures += 1;
         }
-        if self.gamma.iter().all(|g| g.is_finite()) {
+        if done && self.is_feasible(problem) {
+            // As good, and its product is there.
+            lambda.copy_from_slice(&self.z);
+            W_lambda.clone_from(&self.Wz);
+        } else if self.gamma.iter().all(|g| g.is_finite()) {
             lambda.copy_from_slice(&self.gamma);
             problem.multiply(lambda, W_lambda);
         }
         work
+    }
+
+    /// Whether z is on the cones to the last bit.
+    fn is_feasible(&self, problem: &ConeProblem) -> bool {
+        (0..problem.contacts()).all(|i| {
+            let z = spatial(&self.z[problem.offsets[i]..problem.offsets[i + 1]]);
+            cone::project(z, problem.laws[i]).force == z
+        })
     }
 
     /// Whether the forces solve the problem as they are.
@@ -204,11 +226,12 @@ impl ConeSolver {
             self.dz.clear();
             self.dz.extend(self.gamma.iter().zip(&z).map(|(g, z)| g - z));
             let u = std::mem::take(&mut self.u);
-            let found = self.newton_direction(problem, &u, work);
+            let found = self.set_curvature(problem, &u, work);
             self.u = u;
             if !found {
                 break;
             }
+            self.solve_direction(problem);
             let dz = std::mem::take(&mut self.dz);
             let mut Wdz = std::mem::take(&mut self.Wdz);
             problem.multiply(&dz, &mut Wdz);
@@ -243,21 +266,7 @@ impl ConeSolver {
         }
         work.newton_steps += 1;
         let expected = std::mem::take(&mut self.expected);
-        self.dz.clear();
-        for i in 0..problem.contacts() {
-            let rows = problem.offsets[i]..problem.offsets[i + 1];
-            let u = spatial(&self.u[rows.clone()]);
-            let there = spatial(&expected[rows.clone()]);
-            let mut columns = [[0.0; 3]; 3];
-            let count = cone::curvature_columns(there, problem.laws[i], self.R[i], &mut columns);
-            let mut force = [cone::constant_part(there, problem.laws[i]), 0.0, 0.0];
-            for column in &columns[..count] {
-                let along = self.R[i] * dot(column, &u);
-                (0..3).for_each(|k| force[k] += column[k] * along);
-            }
-            self.dz.extend(rows.zip(force).map(|(k, f)| f - z[k]));
-        }
-        if self.newton_direction(problem, &expected, work) {
+        if self.expected_direction(problem, &expected, z, work) {
             let dz = std::mem::take(&mut self.dz);
             let mut Wdz = std::mem::take(&mut self.Wdz);
             problem.multiply(&dz, &mut Wdz);
@@ -273,6 +282,41 @@ impl ConeSolver {
             (self.dz, self.Wdz) = (dz, Wdz);
         }
         self.expected = expected;
+    }
+
+    /// From z to where [`Self::jump`] goes, in `dz`.
+    fn expected_direction(
+        &mut self,
+        problem: &ConeProblem,
+        expected: &[f64],
+        z: &[f64],
+        work: &mut ConeWork,
+    ) -> bool {
+        if !self.set_curvature(problem, expected, work) {
+            return false;
+        }
+        let constant = |i: usize| {
+            let there = spatial(&expected[problem.offsets[i]..problem.offsets[i + 1]]);
+            cone::constant_part(there, problem.laws[i])
+        };
+        self.dz.clear();
+        // What begins with forces of the expected kind needs no product with W.
+        if self.hessian.solve_within(problem, &self.u, &self.R, z, constant, &mut self.dz) {
+            return true;
+        }
+        self.dz.clear();
+        for i in 0..problem.contacts() {
+            let rows = problem.offsets[i]..problem.offsets[i + 1];
+            let u = spatial(&self.u[rows.clone()]);
+            let mut force = [constant(i), 0.0, 0.0];
+            for column in self.hessian.columns_of(i) {
+                let along = self.R[i] * dot(column, &u);
+                (0..3).for_each(|k| force[k] += column[k] * along);
+            }
+            self.dz.extend(rows.zip(force).map(|(k, f)| f - z[k]));
+        }
+        self.solve_direction(problem);
+        true
     }
 
     fn set_regularisation(&mut self, problem: &ConeProblem, epsilon: f64) {
@@ -301,19 +345,22 @@ impl ConeSolver {
         }
     }
 
-    /// Turns b in `dz` to `(1 + L Lᵀ W)⁻¹ b`, with the curvature L Lᵀ at u.
-    fn newton_direction(&mut self, problem: &ConeProblem, u: &[f64], work: &mut ConeWork) -> bool {
+    /// Takes the curvature L Lᵀ at u and factors what it leads to; false where that fails.
+    fn set_curvature(&mut self, problem: &ConeProblem, u: &[f64], work: &mut ConeWork) -> bool {
         self.hessian.set_curvature(problem, u, &self.R);
-        if self.hessian.order() == 0 {
-            return true;
+        match self.hessian.factorize(problem) {
+            Some(had_to) => work.factorizations += usize::from(had_to),
+            None => return false,
         }
-        let Some(had_to) = self.hessian.factorize(problem) else {
-            return false;
-        };
-        work.factorizations += usize::from(had_to);
-        problem.multiply(&self.dz, &mut self.Wdz);
-        self.hessian.solve(problem, &mut self.dz, &self.Wdz);
         true
+    }
+
+    /// Turns b in `dz` to `(1 + L Lᵀ W)⁻¹ b`.
+    fn solve_direction(&mut self, problem: &ConeProblem) {
+        if self.hessian.order() > 0 {
+            problem.multiply(&self.dz, &mut self.Wdz);
+            self.hessian.solve(problem, &mut self.dz, &self.Wdz);
+        }
     }
 
     /// Root of the monotone `f′(t) = (W dz)·(z + t dz − γ(z + t dz))`, to a tenth of f′(0).

@@ -104,8 +104,7 @@ impl ContactSystem {
         let reactions = self.take_reactions(partners, h);
         self.open.clear();
         for row in &self.rows[self.active..] {
-            let moved = relative_motion(row, bodies, partners, &reactions, h);
-            self.open.push(row.goal + row.frame[0].dot(&moved));
+            self.open.push(end(row, bodies, partners, &reactions, h));
         }
         self.reactions = reactions;
         let edge = |side: &Side| match side {
@@ -159,9 +158,12 @@ impl ContactSystem {
         self.problem.multiply(&self.lambda, &mut self.slips);
     }
 
-    /// Lets the solve begin where the last step's forces and slips were.
-    pub fn expect(&mut self) {
-        self.solver.expect(&self.problem, &self.lambda, &self.shift);
+    /// Lets the solve begin where the last step's forces and slips were, and where the bodies' trial positions are.
+    pub fn expect(&mut self, bodies: &[BodyProblem], partners: &Partners, h: f64) {
+        let reactions = self.take_reactions(partners, h);
+        let end = |i: usize| end(&self.rows[i], bodies, partners, &reactions, h);
+        self.solver.expect(&self.problem, &self.lambda, &self.shift, end);
+        self.reactions = reactions;
     }
 
     /// Takes the gaps at the bodies' trial positions, to which the present forces have brought them,
@@ -305,6 +307,11 @@ fn goal(row: &Row, bodies: &[BodyProblem], partners: &Partners, h: f64, limits: 
         return -row.restitution * approach * h;
     }
     row.gap.max(-limits.recovery_speed * h)
+}
+
+/// What is left of the gap, above its goal, at the bodies' trial positions \[m\].
+fn end(row: &Row, bodies: &[BodyProblem], partners: &Partners, reactions: &[Reaction], h: f64) -> f64 {
+    row.goal + row.frame[0].dot(&relative_motion(row, bodies, partners, reactions, h))
 }
 
 /// How far side 0 has moved against side 1 since the start of the step \[m\]: bodies at their trial

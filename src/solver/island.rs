@@ -188,7 +188,7 @@ impl Island {
         let factors = Factors { cache: factors, tangents: &self.tangents };
         timed(time, || contacts.assemble(bodies, factors, partners, h));
         if assembly == Assembly::Anew {
-            self.contacts.expect();
+            contacts.expect(bodies, partners, h);
         }
     }
 
