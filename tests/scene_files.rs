@@ -50,13 +50,37 @@ fn shipped_scenes_parse() {
 #[test]
 fn wrong_files_are_answered_with_line_key_and_what_would_be_right() {
     // What is replaced by what; the line; what the answer has to say.
-    let table: [(&str, &str, usize, &[&str]); 23] = [
+    let table: [(&str, &str, usize, &[&str]); 27] = [
         ("duration = 1.0", "duration = -1.0", 2, &["duration", "positive"]),
         (
             "[[probe]]",
             "[[joint]]\nbetween = [\"floor\", \"bar\"]\nkind = { fixed = {} }\nanchor = [0.0, 0.0, 0.0]\n[[probe]]",
             15,
             &["between", "bar", "floor"],
+        ),
+        (
+            "[[probe]]",
+            "[[attach]]\ndeformable = \"cube\"\nto = \"hand\"\nregion = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }\n[[probe]]",
+            16,
+            &["to", "hand", "floor"],
+        ),
+        (
+            "[[probe]]",
+            "[[move]]\nof = \"floor\"\nduring = [0.0, 1.0]\nby = [0.0, 1.0, 0.0]\n[[probe]]",
+            15,
+            &["of", "floor", "kinematic", "none"],
+        ),
+        (
+            "[[deformable]]",
+            "[[rigid]]\nname = \"plate\"\nkind = \"kinematic\"\nshape = { ball = { radius = 1.0 } }\n[[move]]\nof = \"plate\"\nduring = [1.0, 1.0]\nby = [0.0, 1.0, 0.0]\n[[deformable]]",
+            15,
+            &["during", "1"],
+        ),
+        (
+            "[[probe]]",
+            "[[attach]]\ndeformable = \"floor\"\nto = \"floor\"\nregion = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }\n[[probe]]",
+            15,
+            &["deformable", "floor", "cube"],
         ),
         ("[[probe]]", "pinned = 3\n[[probe]]", 14, &["pinned", "min", "list"]),
         ("duration = 1.0", "durations = 1.0", 2, &["durations", "duration"]),

@@ -1,5 +1,6 @@
 //! A scene file turned into a rapier world and a deformable one.
 
+use super::control::Motored;
 use super::file::{self, Body, JointKind, Kind, Quantity, Scene, Shape};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
@@ -12,6 +13,8 @@ pub struct Stage {
     pub rigid: Vec<(String, RigidBodyHandle, ColliderHandle)>,
     pub deformable: Vec<(String, DeformableBodyHandle)>,
     pub probes: Vec<(String, DeformableBodyHandle, usize)>,
+    /// Joints with a motor, in the order of the file.
+    pub motors: Vec<Motored>,
 }
 
 pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
@@ -27,6 +30,7 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
         rigid: Vec::new(),
         deformable: Vec::new(),
         probes: Vec::new(),
+        motors: Vec::new(),
     };
     for body in &scene.rigid {
         let name = body.name.as_ref().clone();
@@ -43,6 +47,9 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
         let mut collider = ColliderBuilder::new(shape(body.shape.as_ref()))
             .friction(body.friction)
             .restitution(body.restitution);
+        if !body.collides {
+            collider = collider.collision_groups(InteractionGroups::none());
+        }
         if let Some(mass) = &body.mass {
             collider = collider.mass(*mass.as_ref());
         }
@@ -58,6 +65,7 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
         let handle = stage.world.insert(deformable(body, folder));
         stage.deformable.push((name.clone(), handle.map_err(|e| format!("deformable \"{name}\": {e}"))?));
     }
+    scene.attach.iter().try_for_each(|attach| stage.attach(attach))?;
     for probe in &scene.probe {
         let owner = stage.deformable.iter().find(|(name, _)| name == probe.of.as_ref());
         let Some(&(_, handle)) = owner else { continue };
@@ -193,33 +201,49 @@ impl Stage {
         let anchor = |body: RigidBodyHandle| {
             self.physics.bodies[body].position().inverse_transform_point(joint.anchor.into())
         };
-        let (mut data, free): (GenericJoint, _) = match joint.kind {
-            JointKind::Fixed {} => (FixedJointBuilder::new().into(), None),
-            JointKind::Revolute { axis } => {
-                let axis = Vector::from(axis).normalize();
-                (RevoluteJointBuilder::new(axis).into(), Some(JointAxis::AngX))
-            }
+        let mut data: GenericJoint = match joint.kind {
+            JointKind::Fixed {} => FixedJointBuilder::new().into(),
+            JointKind::Revolute { axis } => RevoluteJointBuilder::new(Vector::from(axis).normalize()).into(),
             JointKind::Prismatic { axis } => {
-                let axis = Vector::from(axis).normalize();
-                (PrismaticJointBuilder::new(axis).into(), Some(JointAxis::LinX))
+                PrismaticJointBuilder::new(Vector::from(axis).normalize()).into()
             }
         };
         data.set_local_anchor1(anchor(first));
         data.set_local_anchor2(anchor(second));
-        if let (Some(motor), Some(axis)) = (joint.motor, free) {
+        let motor = joint.motor.as_ref();
+        if let (Some(motor), Some(axis)) = (motor, joint.kind.free_axis()) {
             data.set_motor_model(axis, MotorModel::ForceBased);
             data.set_motor_velocity(axis, motor.velocity, motor.damping);
             data.set_motor_max_force(axis, motor.max_force);
         }
-        if joint.multibody {
-            let made = self.physics.multibody_joints.insert(first, second, data, true);
-            made.map(|_| ()).ok_or_else(|| {
+        let made = if joint.multibody {
+            let link = self.physics.multibody_joints.insert(first, second, data, true);
+            Motored::Link(link.ok_or_else(|| {
                 format!("joint: \"{}\" is a link of a multibody already", joint.between[1].as_ref())
-            })
+            })?)
         } else {
-            self.physics.impulse_joints.insert(first, second, data, true);
-            Ok(())
+            Motored::Joint(self.physics.impulse_joints.insert(first, second, data, true))
+        };
+        if motor.is_some() {
+            self.motors.push(made);
         }
+        Ok(())
+    }
+
+    /// Ties a deformable to a rigid body; names were checked with the file.
+    fn attach(&mut self, attach: &file::Attach) -> Result<(), String> {
+        let soft = self.deformable.iter().find(|(name, _)| name == attach.deformable.as_ref());
+        let rigid = self.rigid.iter().find(|(name, ..)| name == attach.to.as_ref());
+        let (Some((name, soft)), Some((_, rigid, _))) = (soft, rigid) else { return Ok(()) };
+        let body = &self.world.bodies[*soft];
+        let of_surface: std::collections::BTreeSet<usize> =
+            body.model().surface_triangles().flatten().map(|v| v as usize).collect();
+        let (min, max) = (Vector::from(attach.region.min), Vector::from(attach.region.max));
+        let mut vertices = body.vertices_where(|x| x.cmpge(min).all() && x.cmple(max).all());
+        vertices.retain(|v| of_surface.contains(v));
+        let to = AttachTo::RigidBody(*rigid, *self.physics.bodies[*rigid].position());
+        let made = self.world.bodies.attach(*soft, &vertices, to);
+        made.map(|_| ()).map_err(|e| format!("attach: \"{name}\": {e}"))
     }
 
     /// The present value of a quantity of a named thing; names were checked with the file.

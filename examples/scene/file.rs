@@ -1,5 +1,6 @@
 //! The scene file: what it may hold, and what is said of one that holds something else.
 
+use rapier3d::prelude::JointAxis;
 use serde::Deserialize;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -18,6 +19,10 @@ pub struct Scene {
     pub joint: Vec<Joint>,
     #[serde(default)]
     pub deformable: Vec<Deformable>,
+    #[serde(default)]
+    pub attach: Vec<Attach>,
+    #[serde(default, rename = "move")]
+    pub moves: Vec<Move>,
     #[serde(default)]
     pub probe: Vec<Probe>,
     #[serde(default)]
@@ -67,6 +72,13 @@ pub struct Rigid {
     pub restitution: f32,
     #[serde(default)]
     pub can_sleep: bool,
+    /// Whether other rigid bodies and deformables touch it.
+    #[serde(default = "yes")]
+    pub collides: bool,
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn friction() -> f32 {
@@ -104,13 +116,34 @@ pub enum JointKind {
     Prismatic { axis: Vec3 },
 }
 
+impl JointKind {
+    pub fn free_axis(&self) -> Option<JointAxis> {
+        match self {
+            Self::Fixed {} => None,
+            Self::Revolute { .. } => Some(JointAxis::AngX),
+            Self::Prismatic { .. } => Some(JointAxis::LinX),
+        }
+    }
+}
+
 /// Drives the free axis of a joint with no more than `max_force` [N, N m].
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Motor {
     pub velocity: f32,
     pub damping: f32,
     pub max_force: f32,
+    /// Other velocities from later times on.
+    #[serde(default)]
+    pub then: Vec<Switch>,
+}
+
+/// A motor's velocity from a time on.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Switch {
+    pub at: Spanned<f32>,
+    pub velocity: f32,
 }
 
 #[derive(Debug, Deserialize)]
@@ -291,6 +324,45 @@ pub enum Frames {
     PerNode,
 }
 
+/// Surface vertices of a deformable in a box of the world, held by a rigid body where they are at the start.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Attach {
+    pub deformable: Spanned<String>,
+    pub to: Spanned<String>,
+    pub region: Region,
+}
+
+/// How a kinematic body moves beside its velocities: smoothly by a vector, or to and fro by it.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Move {
+    pub of: Spanned<String>,
+    /// Begin and end [s].
+    pub during: Spanned<[f32; 2]>,
+    pub by: Vec3,
+    /// Periods to and fro; comes back to where it was then.
+    pub swings: Option<u32>,
+}
+
+impl Move {
+    /// Share of `by` at a time [s].
+    pub fn share(&self, time: f32) -> f32 {
+        let [begin, end] = *self.during.as_ref();
+        let smooth = |t: f32| t.clamp(0.0, 1.0).powi(2) * (3.0 - 2.0 * t.clamp(0.0, 1.0));
+        let along = ((time - begin) / (end - begin)).clamp(0.0, 1.0);
+        match self.swings {
+            None => smooth(along),
+            // The first and the last period swell and fade.
+            Some(swings) => {
+                let turns = along * swings as f32;
+                let swell = smooth(turns.min(swings as f32 - turns));
+                swell * (std::f32::consts::TAU * turns).sin()
+            }
+        }
+    }
+}
+
 /// The vertex of a body that is nearest to a point at the start.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -406,6 +478,7 @@ fn check(scene: &Scene) -> Result<(), Mistake> {
             return Err((joint.between[0].span(), "`axis` of this joint must not be zero".into()));
         }
     }
+    check_control(scene)?;
     for body in &scene.rigid {
         let problem = shape_problem(body.shape.as_ref());
         problem.map_or(Ok(()), |what| Err((body.shape.span(), format!("`shape`: {what}"))))?;
@@ -475,6 +548,43 @@ fn check(scene: &Scene) -> Result<(), Mistake> {
                 return Err((e.quantity.span(), "`equals` needs `within`, its tolerance".into()));
             }
             _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// What holds and drives: attachments, moves and motors.
+fn check_control(scene: &Scene) -> Result<(), Mistake> {
+    let rigid: Vec<&str> = scene.rigid.iter().map(|r| r.name.as_ref().as_str()).collect();
+    let soft: Vec<&str> = scene.deformable.iter().map(|d| d.name.as_ref().as_str()).collect();
+    for attach in &scene.attach {
+        if !soft.contains(&attach.deformable.as_ref().as_str()) {
+            return Err(unknown(&attach.deformable, "deformable", "a deformable", &soft));
+        }
+        if !rigid.contains(&attach.to.as_ref().as_str()) {
+            return Err(unknown(&attach.to, "to", "a rigid body", &rigid));
+        }
+    }
+    for motion in &scene.moves {
+        let kinematic = scene.rigid.iter().filter(|r| r.kind == Kind::Kinematic);
+        let kinematic: Vec<&str> = kinematic.map(|r| r.name.as_ref().as_str()).collect();
+        if !kinematic.contains(&motion.of.as_ref().as_str()) {
+            return Err(unknown(&motion.of, "of", "a kinematic body", &kinematic));
+        }
+        let [begin, end] = *motion.during.as_ref();
+        if !(begin >= 0.0 && begin < end && end.is_finite()) {
+            let message = format!(
+                "`during` is from {begin} to {end} s, but must begin at 0 or later and before it ends"
+            );
+            return Err((motion.during.span(), message));
+        }
+    }
+    for switch in scene.joint.iter().filter_map(|j| j.motor.as_ref()).flat_map(|m| &m.then) {
+        if !(*switch.at.as_ref() >= 0.0) {
+            return Err((
+                switch.at.span(),
+                format!("`at` is {} s, but must not be negative", switch.at.as_ref()),
+            ));
         }
     }
     Ok(())
@@ -553,7 +663,7 @@ impl Material {
 }
 
 fn unknown(name: &Spanned<String>, key: &str, what: &str, right: &[&str]) -> Mistake {
-    let message =
-        format!("`{key}` names \"{}\", which is not {what}; there are: {}", name.as_ref(), right.join(", "));
+    let there_are = if right.is_empty() { "none".into() } else { right.join(", ") };
+    let message = format!("`{key}` names \"{}\", which is not {what}; there are: {there_are}", name.as_ref());
     (name.span(), message)
 }

@@ -4,6 +4,7 @@
 //! fails or a file is wrong. Without files it runs every scene in `examples/scenes`.
 
 mod build;
+mod control;
 mod file;
 mod report;
 
@@ -69,6 +70,7 @@ fn run(path: &Path, out: &Path) -> Result<usize, String> {
     let mut trace = report::Trace::new(&stage);
     let mut results: Vec<Option<f64>> = vec![None; scene.expect.len()];
     for step in 1..=steps {
+        control::drive(&scene, &mut stage, ((step - 1) as f64 * dt) as f32, dt as f32);
         stage.world.step(&mut stage.physics);
         let time = step as f64 * dt;
         trace.record(time, &stage);

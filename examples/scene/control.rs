@@ -1,0 +1,46 @@
+//! What a scene does to its bodies while it runs: kinematic bodies that move, motors that turn round.
+
+use super::build::Stage;
+use super::file::Scene;
+use rapier3d::prelude::*;
+
+/// A joint with a motor.
+#[derive(Clone, Copy)]
+pub enum Motored {
+    Joint(ImpulseJointHandle),
+    Link(MultibodyJointHandle),
+}
+
+/// Sets velocities for the step from `time` to `time + dt` \[s\].
+pub fn drive(scene: &Scene, stage: &mut Stage, time: f32, dt: f32) {
+    for body in scene.rigid.iter().filter(|b| scene.moves.iter().any(|m| m.of.as_ref() == b.name.as_ref())) {
+        let own = scene.moves.iter().filter(|m| m.of.as_ref() == body.name.as_ref());
+        let moved = |at: f32| own.clone().map(|m| Vector::from(m.by) * m.share(at)).sum::<Vector>();
+        let velocity = Vector::from(body.linvel) + (moved(time + dt) - moved(time)) / dt;
+        let handle = stage.rigid.iter().find(|(name, ..)| name == body.name.as_ref()).map(|r| r.1);
+        if let Some(body) = handle.and_then(|h| stage.physics.bodies.get_mut(h)) {
+            body.set_linvel(velocity, true);
+        }
+    }
+    let motors = scene.joint.iter().filter_map(|joint| Some((joint, joint.motor.as_ref()?)));
+    for ((joint, motor), made) in motors.zip(&stage.motors) {
+        for switch in &motor.then {
+            let at = *switch.at.as_ref();
+            if !(time - 0.5 * dt..time + 0.5 * dt).contains(&at) {
+                continue;
+            }
+            let data = match *made {
+                Motored::Joint(handle) => {
+                    stage.physics.impulse_joints.get_mut(handle, true).map(|j| &mut j.data)
+                }
+                Motored::Link(handle) => {
+                    let found = stage.physics.multibody_joints.get_mut(handle);
+                    found.and_then(|(multibody, link)| Some(&mut multibody.link_mut(link)?.joint.data))
+                }
+            };
+            if let (Some(data), Some(axis)) = (data, joint.kind.free_axis()) {
+                data.set_motor_velocity(axis, switch.velocity, motor.damping);
+            }
+        }
+    }
+}
