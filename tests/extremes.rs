@@ -22,8 +22,9 @@ struct Found {
     growth: f64,
     excess: f64,
     finite: bool,
-    /// Lowest centre of mass, in units of the size.
+    /// Lowest centre of mass of the cube, and of the box, in units of the size.
     lowest: f64,
+    lowest_box: f64,
 }
 
 /// A soft cube of 5 cm (as E = 1e3 wants) thrown on a fixed floor, with a rigid box on top of it that
@@ -42,6 +43,8 @@ fn throw(c: Corner) -> Found {
     let mass = c.ratio * world.bodies[soft].mass();
     let shape = ColliderBuilder::cuboid(half, half, half).mass(mass as f32).friction(MU as f32);
     let body = RigidBodyBuilder::dynamic().translation(Vector::Y * (3.0 * half + 0.011)).can_sleep(false);
+    // Rapier's own sweep against the floor, for what has crushed the cube.
+    let body = body.ccd_enabled(true);
     let (load, _) = physics.insert(body.linvel(Vector::Y * -c.speed), shape);
     let energy = |world: &DeformableWorld, physics: &PhysicsWorld| {
         let b = &physics.bodies[load];
@@ -55,7 +58,13 @@ fn throw(c: Corner) -> Found {
     let start = energy(&world, &physics).max(mass * G * f64::from(3.0 * half + 0.011));
     // The kinetic energy, or that of falling by a size of the cube.
     let impact = moving * (0.5 * f64::from(c.speed * c.speed) + G * 0.05);
-    let mut found = Found { growth: 0.0, excess: f64::NEG_INFINITY, finite: true, lowest: f64::INFINITY };
+    let mut found = Found {
+        growth: 0.0,
+        excess: f64::NEG_INFINITY,
+        finite: true,
+        lowest: f64::INFINITY,
+        lowest_box: f64::INFINITY,
+    };
     let mut before = f64::INFINITY;
     for _ in 0..30 {
         world.step(&mut physics);
@@ -63,16 +72,15 @@ fn throw(c: Corner) -> Found {
         found.growth = found.growth.max((now - before) / impact);
         found.excess = found.excess.max((now - start) / impact);
         found.finite &= now.is_finite() && world.bodies[soft].is_enabled();
-        let rigid = f64::from(physics.bodies[load].translation().y);
-        let lowest = world.bodies[soft].center_of_mass()[1].min(rigid);
-        found.lowest = found.lowest.min(lowest / 0.05);
+        found.lowest = found.lowest.min(world.bodies[soft].center_of_mass()[1] / 0.05);
+        found.lowest_box = found.lowest_box.min(f64::from(physics.bodies[load].translation().y) / 0.05);
         before = now;
     }
     found
 }
 
 #[test]
-fn nothing_becomes_infinite_and_what_is_not_crushed_stays_above_the_floor() {
+fn no_corner_makes_energy_or_goes_through_the_floor() {
     let mut corners = Vec::new();
     for e in [1e3, 1e6, 1e9] {
         for nu in [0.0, 0.49] {
@@ -89,27 +97,32 @@ fn nothing_becomes_infinite_and_what_is_not_crushed_stays_above_the_floor() {
     }
     let thrown: Vec<Found> = corners.par_iter().map(|c| throw(*c)).collect();
     println!(
-        "| E [Pa] | ν | h [s] | rigid : soft | iterations | speed [m/s] | growth | above start | lowest |"
+        "| E [Pa] | ν | h [s] | rigid : soft | iterations | speed [m/s] | growth | above start | lowest cube | box |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|");
     for (c, f) in corners.iter().zip(&thrown) {
         if f.growth > 2e-3 || f.excess > 1e-6 || f.lowest < 0.0 {
             println!(
-                "| {:.0e} | {} | {:.4} | {:.0e} | {} | {} | {:.1e} | {:.1e} | {:.2} |",
-                c.e, c.nu, c.dt, c.ratio, c.iterations, c.speed, f.growth, f.excess, f.lowest
+                "| {:.0e} | {} | {:.4} | {:.0e} | {} | {} | {:.1e} | {:.1e} | {:.3} | {:.3} |",
+                c.e, c.nu, c.dt, c.ratio, c.iterations, c.speed, f.growth, f.excess, f.lowest, f.lowest_box
             );
         }
     }
-    let through = thrown.iter().filter(|f| f.lowest < 0.0).count();
-    println!("{} corners, {through} with a centre of mass below the floor at some time", corners.len());
+    println!("{} corners", corners.len());
     for (c, f) in corners.iter().zip(&thrown) {
         assert!(f.finite, "{c:?}: {f:?}");
-        // A weight that a body of this stiffness can carry, in steps of a game: what is beyond is crushed to
-        // a film, through which rigid bodies come to the floor that rapier alone keeps them above.
+        // A crushed cube is a film on the floor: nodes without contact stop there, those with one as far below as the
+        // iterations leave them. The box then lies on the floor by rapier's contacts.
+        let depth = if c.iterations == 1 { -0.1 } else { -0.01 };
+        assert!(f.lowest > depth && f.lowest_box > 0.4, "{c:?}: {f:?}");
+        // A box of 1000 times the mass that crushes its cube at 100 m/s goes on for a step, with the speed of one step
+        // of gravity that its way does not show.
+        assert!(f.excess < 3e-3, "{c:?}: {f:?}");
+        // What a body of this stiffness can carry, in steps of a game.
         let carries = c.e >= 1e6 && c.dt < 0.02 && c.speed == 0.0;
-        if carries {
-            assert!(f.lowest > 0.0, "{c:?}: {f:?}");
-            assert!(c.iterations == 1 || f.growth < 2e-3, "{c:?}: {f:?}");
-        }
+        assert!(!carries || f.lowest > 0.0, "{c:?}: {f:?}");
+        // Beyond that a crushed cube, pinched between box and floor, comes back in jumps.
+        let growth = if carries { 2e-3 } else { 0.1 };
+        assert!(c.iterations == 1 || f.growth < growth, "{c:?}: {f:?}");
     }
 }

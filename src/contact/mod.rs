@@ -7,6 +7,7 @@ mod between;
 mod candidates;
 pub(crate) mod cone;
 mod crossing;
+pub(crate) mod crossing_nodes;
 mod detection;
 mod obstacle;
 mod queries;

@@ -119,6 +119,11 @@ impl Side {
         }
     }
 
+    /// Whether it is on the soft body at this place.
+    pub fn is_of(&self, place: usize) -> bool {
+        matches!(self, Side::Soft { body, .. } if *body == place)
+    }
+
     /// Value of a nodal field at a soft side.
     pub fn interpolate(&self, field: &[Vec3]) -> Vec3 {
         self.soft_nodes().fold(Vec3::zeros(), |sum, (n, w)| sum + field[n] * w)

@@ -381,6 +381,7 @@ impl DeformablePipeline {
                 let Some(body) = deformables.get_mut(handle) else { continue };
                 if finite {
                     store(body, work, local, h, &mut self.counters);
+                    self.works[index].stop_crossings(body, work, local, &self.scene, h);
                     give_forces(&work.island.bodies[local], deformables);
                 } else if !work.island.bodies[local].current.x.iter().all(is_number) {
                     quarantine(body, &mut self.counters);

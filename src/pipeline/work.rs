@@ -4,6 +4,7 @@ use crate::body::{
     ContactMemory, DeformableAttachmentHandle, DeformableBody, DeformableBodyHandle, DeformableState, Hold,
     is_number,
 };
+use crate::contact::crossing_nodes::{Stop, comes_near, stop};
 use crate::contact::{Candidates, Detector, Pair, Row, STATIC_MARGIN, Side, SoftSurface, SurfaceTree};
 use crate::coupling::{RapierScene, RapierSets, combined, packed};
 use crate::math::Vec3;
@@ -33,10 +34,17 @@ pub(super) struct BodyWork {
     /// Other deformables are near, or the body may touch itself.
     pub in_company: bool,
     tree: SurfaceTree,
+    /// Nodes that contacts with obstacles act on.
+    touching: Vec<u32>,
 }
 
 /// How far a body that touches nothing looks ahead \[s\].
 const LOOK_AHEAD: f64 = 0.5;
+
+/// How far from an obstacle crossing nodes are stopped, in mean edges.
+const CLEARANCE: f64 = 1.0e-3;
+/// Depth, in mean edges, at which a node of the surface without a contact counts as crossing.
+const MISSED: f64 = 0.05;
 
 impl BodyWork {
     pub fn new(handle: DeformableBodyHandle) -> Self {
@@ -55,6 +63,7 @@ impl BodyWork {
             extent: Aabb::new_invalid(),
             in_company: false,
             tree: SurfaceTree::default(),
+            touching: Vec::new(),
         }
     }
 
@@ -182,6 +191,62 @@ impl BodyWork {
         let shift = mean * LOOK_AHEAD;
         candidates.on_the_way(&scene.obstacles, points, &shift, &mut self.near, &mut self.distances);
         self.ahead.extend(self.distances.iter().map(|(_, s)| *s));
+    }
+
+    /// Stops what has come into obstacles that do not yield in a step of `h` \[s\] although no contact was found there:
+    /// nodes from inside a crushed body, or a body that has given its step up, as a whole.
+    pub fn stop_crossings(
+        &mut self,
+        body: &mut DeformableBody,
+        island: &IslandWork,
+        local: usize,
+        scene: &RapierScene,
+        h: f64,
+    ) {
+        let problem = &island.island.bodies[local];
+        self.touching.clear();
+        for row in &island.island.contacts.rows {
+            match row.sides[0] {
+                Side::Soft { body, nodes, weights } if body == local && weights[0] == 1.0 => {
+                    self.touching.push(nodes[0])
+                }
+                _ => {}
+            }
+        }
+        self.touching.sort_unstable();
+        let edge = body.model.surface.mean_edge;
+        let solid = self.near.iter().map(|&o| &scene.obstacles[o as usize]);
+        for obstacle in solid.filter(|o| !scene.partners.yields(o.partner)) {
+            let swept = obstacle.swept_aabb();
+            let DeformableState { x, v, .. } = &mut body.state;
+            let mut deepest: Option<(f64, Stop, Vec3)> = None;
+            for (node, from) in problem.x_start.iter().enumerate() {
+                let is_inner = body.model.surface.index_of_node[node] == u32::MAX;
+                let has_contact =
+                    !is_inner && !problem.gave_up && self.touching.binary_search(&(node as u32)).is_ok();
+                if has_contact || !comes_near(&swept, from, &x[node]) {
+                    continue;
+                }
+                let is_pinned = problem.key.pins.binary_search(&(node as u32)).is_ok();
+                let Some(stop) = stop(obstacle, from, &x[node], CLEARANCE * edge).filter(|_| !is_pinned)
+                else {
+                    continue;
+                };
+                let depth = (stop.at - x[node]).norm();
+                if problem.gave_up {
+                    if deepest.is_none_or(|(d, ..)| depth > d) {
+                        deepest = Some((depth, stop, stop.at - x[node]));
+                    }
+                } else if is_inner || depth > MISSED * edge {
+                    x[node] = stop.at;
+                    v[node] = stop.slowed(&v[node], h);
+                }
+            }
+            if let Some((_, stop, shift)) = deepest {
+                x.iter_mut().for_each(|x| *x += shift);
+                v.iter_mut().for_each(|v| *v = stop.slowed(v, h));
+            }
+        }
     }
 
     /// Takes another place in the step's list.

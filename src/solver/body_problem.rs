@@ -53,6 +53,8 @@ pub(crate) struct BodyProblem {
     /// Factor c ≥ 1 on A, raised by the guard.
     pub scaling: f64,
     pub guard_retries: usize,
+    /// No step was found that does not make energy: the body moves as a whole.
+    pub gave_up: bool,
     /// A force that counts as large for this body \[N\].
     pub weight: f64,
     pub(super) step: Vec<Vec3>,
@@ -106,6 +108,7 @@ impl BodyProblem {
             metric: Metric::default(),
             scaling: 1.0,
             guard_retries: 0,
+            gave_up: false,
             weight: 0.0,
             step: vec![Vec3::zeros(); n],
             force: Vec::new(),
@@ -152,6 +155,7 @@ impl BodyProblem {
         self.h = h;
         self.scaling = 1.0;
         self.guard_retries = 0;
+        self.gave_up = false;
         self.metric.effort = Effort::default();
         self.x_start.clone_from(&body.state.x);
         self.v_start.clone_from(&body.state.v);

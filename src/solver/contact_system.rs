@@ -179,7 +179,8 @@ impl ContactSystem {
         let reactions = self.take_reactions(partners, h);
         self.g_free.clear();
         for row in &self.rows[..self.active] {
-            let moved = relative_motion(row, bodies, partners, &reactions, h);
+            let at_trial = |body: usize| &bodies[body].trial.x[..];
+            let moved = relative_motion(row, bodies, at_trial, partners, &reactions, h);
             let of_forces = &self.slips[self.g_free.len()..];
             let motions = row.directions().iter().map(|d| d.dot(&moved)).zip(of_forces);
             let first = self.g_free.len();
@@ -232,7 +233,36 @@ impl ContactSystem {
         }
     }
 
-    fn lay_forces(&self, bodies: &mut [BodyProblem]) {
+    /// What the contacts of a body have put into all that they touch \[J\]: work on both of their sides, with the bodies
+    /// at their current positions. Closing contacts and friction take some.
+    pub fn made_energy(&mut self, index: usize, bodies: &[BodyProblem], partners: &Partners, h: f64) -> f64 {
+        let reactions = self.take_reactions(partners, h);
+        let mut sum = 0.0;
+        for (i, row) in self.rows[..self.active].iter().enumerate() {
+            let is_contact = matches!(row.law, Law::Contact { .. });
+            if is_contact && row.sides.iter().any(|side| side.is_of(index)) {
+                let at = |body: usize| &bodies[body].current.x[..];
+                sum += self.force(i).dot(&relative_motion(row, bodies, at, partners, &reactions, h));
+            }
+        }
+        self.reactions = reactions;
+        sum
+    }
+
+    /// Takes the forces from all that acts on a body, and from what is between rigid bodies: rapier's own solver
+    /// then has all of that.
+    pub fn release(&mut self, index: usize) {
+        let is_rigid = |side: &Side| !matches!(side, Side::Soft { .. });
+        for (i, row) in self.rows[..self.active].iter().enumerate() {
+            if row.sides.iter().any(|side| side.is_of(index)) || row.sides.iter().all(is_rigid) {
+                self.lambda[self.problem.offsets[i]..self.problem.offsets[i + 1]].fill(0.0);
+                self.shift[i] = 0.0;
+            }
+        }
+    }
+
+    /// Lays the forces on the nodes.
+    pub fn lay_forces(&self, bodies: &mut [BodyProblem]) {
         for body in bodies.iter_mut() {
             body.contact_force.fill(Vec3::zeros());
         }
@@ -311,23 +341,24 @@ fn goal(row: &Row, bodies: &[BodyProblem], partners: &Partners, h: f64, limits: 
 
 /// What is left of the gap, above its goal, at the bodies' trial positions \[m\].
 fn end(row: &Row, bodies: &[BodyProblem], partners: &Partners, reactions: &[Reaction], h: f64) -> f64 {
-    row.goal + row.frame[0].dot(&relative_motion(row, bodies, partners, reactions, h))
+    let at_trial = |body: usize| &bodies[body].trial.x[..];
+    row.goal + row.frame[0].dot(&relative_motion(row, bodies, at_trial, partners, reactions, h))
 }
 
-/// How far side 0 has moved against side 1 since the start of the step \[m\]: bodies at their trial
-/// positions, partners under these reactions.
-fn relative_motion(
+/// How far side 0 has moved against side 1 since the start of the step \[m\]: bodies to where they are `at`,
+/// partners under these reactions.
+fn relative_motion<'a>(
     row: &Row,
     bodies: &[BodyProblem],
+    at: impl Fn(usize) -> &'a [Vec3],
     partners: &Partners,
     reactions: &[Reaction],
     h: f64,
 ) -> Vec3 {
     let moved = |side: &Side| match side {
         Side::Soft { body, .. } => {
-            let b = &bodies[*body];
-            let nodes = side.soft_nodes();
-            nodes.fold(Vec3::zeros(), |sum, (n, w)| sum + (b.trial.x[n] - b.x_start[n]) * w)
+            let (x, start) = (at(*body), &bodies[*body].x_start);
+            side.soft_nodes().fold(Vec3::zeros(), |sum, (n, w)| sum + (x[n] - start[n]) * w)
         }
         _ => partners.displacement(side, reactions, h),
     };

@@ -30,6 +30,37 @@ impl BodyProblem {
         x.iter_mut().for_each(|x| *x = centre + shift + rotation * (*x - centre));
     }
 
+    /// Whether the step would make energy out of nothing: for forces λ of the contacts, implicit Euler ends with
+    /// `Ψ(x) − λᵀJx` no higher than where it began [cf. Hairer et al. 2006], and what they give to the body
+    /// their other sides lose, but for what contacts make themselves, `by_contacts` \[J\], by drawing overlaps apart.
+    pub fn gains_energy(&mut self, by_contacts: f64) -> bool {
+        let by_contact: f64 = (self.current.x.iter().zip(&self.x_start).zip(&self.contact_force))
+            .map(|((x, start), f)| (x - start).dot(f))
+            .sum();
+        let mut still = std::mem::take(&mut self.trial);
+        still.x.clone_from(&self.x_start);
+        self.key.pins.iter().for_each(|&p| still.x[p as usize] = self.target[p as usize]);
+        self.evaluate(&mut still, f64::INFINITY);
+        let gained = self.current.objective - by_contact - still.objective + by_contacts.max(0.0);
+        let allowed = 1e-3 * (still.objective + by_contact.abs());
+        self.trial = still;
+        // Written so that what is not a number counts as gained.
+        !(gained <= allowed)
+    }
+
+    /// Gives the step up: the body keeps its shape and goes on with its mean velocity.
+    pub fn move_as_a_whole(&mut self) {
+        self.gave_up = true;
+        let total: f64 = self.masses.iter().sum();
+        let moved = self.target.iter().zip(&self.x_start).zip(&self.masses);
+        let mean = moved.map(|((to, from), m)| (to - from) * *m).sum::<Vec3>() / total;
+        let shift = if self.key.pins.is_empty() { mean } else { Vec3::zeros() };
+        self.current.x.clear();
+        self.current.x.extend(self.x_start.iter().map(|x| x + shift));
+        self.key.pins.iter().for_each(|&p| self.current.x[p as usize] = self.target[p as usize]);
+        self.evaluate_current();
+    }
+
     /// Velocities at the end of the step [m/s]; `in_flight` tells that nothing touched or tied the body. Implicit
     /// Euler then loses angular momentum that nothing has taken: a rotation about the centre of mass puts
     /// it back.

@@ -64,6 +64,8 @@ const ROUNDS: usize = 4;
 const NEARLY_CLOSED: f64 = 0.01;
 /// As [`NEARLY_CLOSED`], once it has been solved.
 const OVERLAPPING: f64 = -1.0e-5;
+/// Residual over forces beyond which a step is looked at again.
+const FAR_FROM_SOLVED: f64 = 0.1;
 /// Largest factor on A that the guard tries.
 const MAX_SCALING: f64 = 1024.0;
 /// Residual relative to the forces that is rounding and nothing else: sums of some tens of terms.
@@ -105,8 +107,32 @@ impl Island {
         }
         if self.contacts.is_empty() {
             self.bodies.iter_mut().filter(|b| b.key.pins.is_empty()).for_each(BodyProblem::balance);
+        } else {
+            self.give_up_what_gains_energy(partners, h);
         }
         self.bodies.iter().for_each(|b| self.report.effort.add(&b.metric.effort));
+    }
+
+    /// Bodies whose step is far from solved and would gain energy move as a whole, and nothing acts on them: where
+    /// forces change wildly from iteration to iteration, what they have done to a body is not what the
+    /// last ones take from others.
+    fn give_up_what_gains_energy(&mut self, partners: &Partners, h: f64) {
+        let mut gave_up = false;
+        for index in 0..self.bodies.len() {
+            let body = &self.bodies[index];
+            if body.residual() <= FAR_FROM_SOLVED * body.force_scale() {
+                continue;
+            }
+            let by_contacts = self.contacts.made_energy(index, &self.bodies, partners, h);
+            if self.bodies[index].gains_energy(by_contacts) {
+                self.bodies[index].move_as_a_whole();
+                self.contacts.release(index);
+                gave_up = true;
+            }
+        }
+        if gave_up {
+            self.contacts.lay_forces(&mut self.bodies);
+        }
     }
 
     /// One iteration.

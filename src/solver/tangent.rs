@@ -70,8 +70,11 @@ impl Tangents {
         })?;
         let surface = &body.model.surface;
         let mut columns = Columns::new(surface, SystemMatrix::RestStiffness);
-        let own = |side: &&Side| matches!(side, Side::Soft { body, .. } if *body == index);
-        let nodes = rows.iter().flat_map(|row| &row.sides).filter(own).flat_map(Side::soft_nodes);
+        let nodes = rows
+            .iter()
+            .flat_map(|row| &row.sides)
+            .filter(|side| side.is_of(index))
+            .flat_map(Side::soft_nodes);
         let nodes = nodes.map(|(node, _)| surface.index_of_node[node]);
         columns.prepare(&body.model, &body.key.pins, symbolic, &factor, nodes, &mut self.scratch);
         self.count += 1;
