@@ -1,6 +1,7 @@
 //! The step, told as a list of verbs, and the world that owns it.
 
 mod contacts;
+mod crossings;
 mod encounters;
 mod ending;
 mod grouping;

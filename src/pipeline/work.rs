@@ -1,10 +1,10 @@
 //! What the pipeline keeps per body from step to step: memory only, nothing that results depend on.
 
+use super::crossings::Crossings;
 use crate::body::{
     ContactMemory, DeformableAttachmentHandle, DeformableBody, DeformableBodyHandle, DeformableState, Hold,
     is_number,
 };
-use crate::contact::crossing_nodes::{Stop, comes_near, stop};
 use crate::contact::{Candidates, Detector, Pair, Row, STATIC_MARGIN, Side, SoftSurface, SurfaceTree};
 use crate::coupling::{RapierScene, RapierSets, combined, packed};
 use crate::math::Vec3;
@@ -22,6 +22,8 @@ pub(super) struct BodyWork {
     pub pairs: usize,
     detector: Detector,
     near: Vec<u32>,
+    /// Obstacles that the body may touch in this step.
+    met: Vec<u32>,
     /// Surface nodes in the order in which they are expected to touch.
     pub ahead: Vec<u32>,
     distances: Vec<(f32, u32)>,
@@ -34,17 +36,11 @@ pub(super) struct BodyWork {
     /// Other deformables are near, or the body may touch itself.
     pub in_company: bool,
     tree: SurfaceTree,
-    /// Nodes that contacts with obstacles act on.
-    touching: Vec<u32>,
+    crossings: Crossings,
 }
 
 /// How far a body that touches nothing looks ahead \[s\].
 const LOOK_AHEAD: f64 = 0.5;
-
-/// How far from an obstacle crossing nodes are stopped, in mean edges.
-const CLEARANCE: f64 = 1.0e-3;
-/// Depth, in mean edges, at which a node of the surface without a contact counts as crossing.
-const MISSED: f64 = 0.05;
 
 impl BodyWork {
     pub fn new(handle: DeformableBodyHandle) -> Self {
@@ -56,6 +52,7 @@ impl BodyWork {
             pairs: 0,
             detector: Detector::default(),
             near: Vec::new(),
+            met: Vec::new(),
             ahead: Vec::new(),
             distances: Vec::new(),
             tied: Vec::new(),
@@ -63,7 +60,7 @@ impl BodyWork {
             extent: Aabb::new_invalid(),
             in_company: false,
             tree: SurfaceTree::default(),
-            touching: Vec::new(),
+            crossings: Crossings::default(),
         }
     }
 
@@ -149,6 +146,7 @@ impl BodyWork {
         sets: RapierSets<'_>,
     ) {
         self.rows.clear();
+        self.met.clear();
         self.pairs = 0;
         let Some(problem) = &self.problem else { return };
         let (model, x) = (&problem.model, &body.state.x);
@@ -160,6 +158,7 @@ impl BodyWork {
             let Some((friction, restitution)) = collider.and_then(|c| combined(body, c)) else {
                 continue;
             };
+            self.met.push(o);
             let obstacle = &scene.obstacles[o as usize];
             let pair = Pair { body: self.index, friction, restitution };
             self.pairs += 1;
@@ -193,8 +192,7 @@ impl BodyWork {
         self.ahead.extend(self.distances.iter().map(|(_, s)| *s));
     }
 
-    /// Stops what has come into obstacles that do not yield in a step of `h` \[s\] although no contact was found there:
-    /// nodes from inside a crushed body, or a body that has given its step up, as a whole.
+    /// Stops what has come into obstacles without a contact in a step of `h` \[s\].
     pub fn stop_crossings(
         &mut self,
         body: &mut DeformableBody,
@@ -203,50 +201,16 @@ impl BodyWork {
         scene: &RapierScene,
         h: f64,
     ) {
-        let problem = &island.island.bodies[local];
-        self.touching.clear();
-        for row in &island.island.contacts.rows {
-            match row.sides[0] {
-                Side::Soft { body, nodes, weights } if body == local && weights[0] == 1.0 => {
-                    self.touching.push(nodes[0])
-                }
-                _ => {}
-            }
-        }
-        self.touching.sort_unstable();
-        let edge = body.model.surface.mean_edge;
-        let solid = self.near.iter().map(|&o| &scene.obstacles[o as usize]);
-        for obstacle in solid.filter(|o| !scene.partners.yields(o.partner)) {
-            let swept = obstacle.swept_aabb();
-            let DeformableState { x, v, .. } = &mut body.state;
-            let mut deepest: Option<(f64, Stop, Vec3)> = None;
-            for (node, from) in problem.x_start.iter().enumerate() {
-                let is_inner = body.model.surface.index_of_node[node] == u32::MAX;
-                let has_contact =
-                    !is_inner && !problem.gave_up && self.touching.binary_search(&(node as u32)).is_ok();
-                if has_contact || !comes_near(&swept, from, &x[node]) {
-                    continue;
-                }
-                let is_pinned = problem.key.pins.binary_search(&(node as u32)).is_ok();
-                let Some(stop) = stop(obstacle, from, &x[node], CLEARANCE * edge).filter(|_| !is_pinned)
-                else {
-                    continue;
-                };
-                let depth = (stop.at - x[node]).norm();
-                if problem.gave_up {
-                    if deepest.is_none_or(|(d, ..)| depth > d) {
-                        deepest = Some((depth, stop, stop.at - x[node]));
-                    }
-                } else if is_inner || depth > MISSED * edge {
-                    x[node] = stop.at;
-                    v[node] = stop.slowed(&v[node], h);
-                }
-            }
-            if let Some((_, stop, shift)) = deepest {
-                x.iter_mut().for_each(|x| *x += shift);
-                v.iter_mut().for_each(|v| *v = stop.slowed(v, h));
-            }
-        }
+        let obstacles = self.met.iter().map(|&o| &scene.obstacles[o as usize]);
+        let solid = obstacles.filter(|o| !scene.partners.yields(o.partner));
+        self.crossings.stop(
+            body,
+            &island.island.bodies[local],
+            &island.island.contacts.rows,
+            local,
+            solid,
+            h,
+        );
     }
 
     /// Takes another place in the step's list.
