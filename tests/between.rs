@@ -329,6 +329,70 @@ fn overlapping_bodies_come_apart() {
 }
 
 #[test]
+fn bodies_in_the_very_same_place_come_apart() {
+    let mut physics = PhysicsWorld::new();
+    physics.gravity = Vector::ZERO;
+    let mut world = DeformableWorld::new();
+    let [a, b] = [0, 1].map(|_| world.insert(soft([0.2; 3], [5; 3], Vector::ZERO)).unwrap());
+    let mut fastest_ever = 0.0f64;
+    for _ in 0..240 {
+        world.step(&mut physics);
+        fastest_ever = fastest_ever.max(fastest(&world));
+    }
+    let boxes = [a, b].map(|body| world.bodies[body].aabb());
+    println!("{fastest_ever:.2} m/s at the most");
+    assert!(!boxes[0].intersects(&boxes[1]), "still in one another");
+    assert!(fastest_ever < 3.0);
+}
+
+#[test]
+fn a_body_deep_in_itself_comes_apart() {
+    // A strip 6 cm thick is bent over itself while it does not feel that, its end led into its other half.
+    let mesh = TetMesh::cuboid([0.5, 0.03, 0.06], [24, 2, 3]).unwrap();
+    for height in [0.05f32, 0.04, 0.03, 0.02] {
+        let (mut physics, _) = world_with_floor(1.0 / 60.0);
+        let mut world = DeformableWorld::new();
+        let strip = DeformableBodyBuilder::mesh(&mesh)
+            .translation(Vector::Y * 0.03)
+            .material(DeformableMaterial::new(1e4, 0.3).friction(0.5).mass_damping(2.0))
+            .can_sleep(false)
+            .pinned(|x| x.x < 0.0 || x.x > 0.47);
+        let strip = world.insert(strip).unwrap();
+        let body = &world.bodies[strip];
+        let at = |v: usize| Vector::from(body.position(v).unwrap().map(|c| c as f32));
+        let tip: Vec<(usize, Vector)> =
+            body.pinned().map(|v| (v, at(v))).filter(|(_, x)| x.x > 0.4).collect();
+        for step in 0..300 {
+            let part = (step as f32 / 200.0).min(1.0);
+            let (sin, cos) = (part * std::f32::consts::PI).sin_cos();
+            let centre = Vector::new(0.04 + 0.445 * cos, 0.03 + height * part + 0.3 * sin, 0.0);
+            for (vertex, from) in &tip {
+                let arm = *from - Vector::new(0.485, 0.03, 0.0);
+                let turned = Vector::new(arm.x * cos - arm.y * sin, arm.x * sin + arm.y * cos, arm.z);
+                world.bodies[strip].move_pin(*vertex, centre + turned).unwrap();
+            }
+            world.step(&mut physics);
+        }
+        let before = overlap_with_itself(&world.bodies[strip], &mesh, 0.15);
+        tip.iter().for_each(|(vertex, _)| world.bodies[strip].unpin(*vertex).unwrap());
+        world.bodies[strip].set_self_contact(true);
+        let mut fastest_ever = 0.0f64;
+        for _ in 0..240 {
+            world.step(&mut physics);
+            fastest_ever = fastest_ever.max(world.bodies[strip].max_speed());
+        }
+        let after = overlap_with_itself(&world.bodies[strip], &mesh, 0.15);
+        println!(
+            "at {height} m: {before:.1e} m deep, {after:.1e} m after 4 s, {fastest_ever:.2} m/s at the most"
+        );
+        // Of a node in a tetrahedron, whose own depth is 1 cm.
+        assert!(before > 1e-3, "it is to be in itself");
+        assert!(after < 1e-4, "still in itself");
+        assert!(fastest_ever < 5.0);
+    }
+}
+
+#[test]
 fn a_body_that_hovers_beside_a_sleeping_one_lets_it_sleep() {
     let (mut physics, _) = world_with_floor(1.0 / 60.0);
     let mut world = DeformableWorld::new();

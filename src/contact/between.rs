@@ -11,7 +11,7 @@
 use super::crossing::{CARRYING_EDGES, NEW_EDGES, crossing};
 use super::row::{Law, Row, Side};
 use super::surface_tree::SurfaceTree;
-use super::tangle::untangle;
+use super::tangle::{untangle, untangle_itself};
 use super::triangle_rows::barycentric;
 use crate::body::{ContactKey, ContactMemory, DeformableModel, SOFT_SLOT};
 use crate::math::Vec3;
@@ -138,8 +138,11 @@ impl BetweenDetector {
         self.cross(pair, surfaces, rows);
         self.drop_late(surfaces, first, rows);
         rows[first..].sort_unstable_by_key(|row| row.key);
-        if !itself && surfaces.iter().all(|s| s.model.surface.is_closed()) {
-            untangle(surfaces, &self.pairs, rows);
+        if surfaces.iter().all(|s| s.model.surface.is_closed()) {
+            match itself {
+                true => untangle_itself(a, &self.pairs, first, rows),
+                false => untangle(surfaces, &self.pairs, rows),
+            }
         }
     }
 
@@ -372,7 +375,7 @@ fn are_neighbours(s: &SoftSurface<'_>, node: usize, triangle: usize) -> bool {
 
 /// Whether two nodes are the same, neighbours, or have a neighbour in common: nothing can come between those
 /// but a crease sharper than the mesh can show.
-fn near_in_mesh(model: &DeformableModel, a: u32, b: u32) -> bool {
+pub(super) fn near_in_mesh(model: &DeformableModel, a: u32, b: u32) -> bool {
     let [of_a, of_b] = [a, b].map(|n| &model.adjacency[n as usize]);
     a == b || of_a.binary_search(&b).is_ok() || of_a.iter().any(|n| of_b.binary_search(n).is_ok())
 }

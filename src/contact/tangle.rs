@@ -1,7 +1,8 @@
-//! Bodies that have gone deep into one another: no contact can tell where they came in, so they are drawn apart
-//! along the line between their middles.
+//! Bodies that have gone deep into one another, or into themselves: no contact can tell where they came in, so they
+//! are drawn apart along the line between their middles, and parts of one body along that between the middles of
+//! what is around the triangles that cut one another.
 
-use super::between::SoftSurface;
+use super::between::{SoftSurface, near_in_mesh};
 use super::row::{Row, Side};
 use crate::body::{ContactKey, SOFT_SLOT};
 use crate::math::{Vec3, to_real};
@@ -26,11 +27,14 @@ pub(super) fn untangle([a, b]: [&SoftSurface<'_>; 2], pairs: &[(u32, u32)], rows
         Side::Soft { body: s.body, nodes, weights: [1.0 / 3.0; 3] }
     };
     let middle = |s: &SoftSurface<'_>| s.x.iter().sum::<Vec3>() / s.x.len() as f64;
-    let mut apart = None;
-    for (ta, tb) in pairs.iter().copied().filter(|&(ta, tb)| go_through(a, ta, b, tb)) {
+    let is_same_place = is_same_place(a, b);
+    // Bodies in the very same place part in any direction.
+    let mut apart = is_same_place.then_some(Some(Vec3::y()));
+    for (ta, tb) in
+        pairs.iter().copied().filter(|&(ta, tb)| is_same_place && ta == tb || go_through(a, ta, b, tb))
+    {
         let apart = *apart.get_or_insert_with(|| {
             let is_deep = is_deep(a, b) || is_deep(b, a);
-            // Bodies in the very same place part in any direction.
             is_deep.then(|| (middle(a) - middle(b)).try_normalize(0.0).unwrap_or_else(Vec3::y))
         });
         let Some(apart) = apart else { return };
@@ -39,6 +43,104 @@ pub(super) fn untangle([a, b]: [&SoftSurface<'_>; 2], pairs: &[(u32, u32)], rows
         rows.push(Row::new([side(a, ta), side(b, tb)], apart, -depth, key));
     }
     rows[first..].sort_unstable_by_key(|row| row.key);
+}
+
+/// Whether two bodies of one mesh are node on node: their triangles touch all over, and none goes through another.
+fn is_same_place(a: &SoftSurface<'_>, b: &SoftSurface<'_>) -> bool {
+    let clearly = CLEARLY * a.model.surface.mean_edge;
+    let is_near = |(p, q): (&Vec3, &Vec3)| (p - q).norm() < clearly;
+    a.x.len() == b.x.len() && a.x.iter().zip(b.x).all(is_near)
+}
+
+/// As [`untangle`], of a body with itself. Other contacts between the same parts, of the rows from `first` on, would
+/// hold them where they are.
+pub(super) fn untangle_itself(
+    own: &SoftSurface<'_>,
+    pairs: &[(u32, u32)],
+    first: usize,
+    rows: &mut Vec<Row>,
+) {
+    let mut apart_rows = Vec::new();
+    let triangle = |t: u32| own.model.surface.triangles[t as usize];
+    for (ta, tb) in pairs.iter().copied().filter(|(ta, tb)| ta < tb) {
+        let near = |a: u32| triangle(tb).iter().any(|&b| near_in_mesh(own.model, a, b));
+        if triangle(ta).into_iter().any(near) || !go_through(own, ta, own, tb) {
+            continue;
+        }
+        let parts = [ta, tb].map(|t| Part::around(own, t));
+        if parts[0].meets(&parts[1])
+            || !(parts[0].is_deep_in(&parts[1], own) || parts[1].is_deep_in(&parts[0], own))
+        {
+            continue;
+        }
+        // Parts in the very same place part in any direction.
+        let apart = (parts[0].middle - parts[1].middle).try_normalize(0.0).unwrap_or_else(Vec3::y);
+        let side = |t: u32| Side::Soft { body: own.body, nodes: triangle(t), weights: [1.0 / 3.0; 3] };
+        let key = ContactKey { obstacle: own.key, part: tb, feature: ta, slot: SLOT };
+        apart_rows.push(Row::new([side(ta), side(tb)], apart, -own.model.surface.mean_edge, key));
+        let mut place = 0;
+        rows.retain(|row| {
+            place += 1;
+            let within = |part: &Part, side: &Side| side.soft_nodes().all(|(n, _)| part.holds(n as u32));
+            let [a, b] = &row.sides;
+            let between = |p: &Part, q: &Part| within(p, a) && within(q, b);
+            place <= first || !(between(&parts[0], &parts[1]) || between(&parts[1], &parts[0]))
+        });
+    }
+    apart_rows.sort_unstable_by_key(|row| row.key);
+    rows.append(&mut apart_rows);
+}
+
+/// What of a body is around a triangle of its surface.
+struct Part {
+    /// Nodes, ascending.
+    nodes: Vec<u32>,
+    middle: Vec3,
+}
+
+/// How far a part reaches, in edges of the mesh.
+const RINGS: usize = 2;
+
+impl Part {
+    fn around(own: &SoftSurface<'_>, triangle: u32) -> Self {
+        let mut nodes = own.model.surface.triangles[triangle as usize].to_vec();
+        for _ in 0..RINGS {
+            let next: Vec<u32> =
+                nodes.iter().flat_map(|&n| &own.model.adjacency[n as usize]).copied().collect();
+            nodes.extend(next);
+            nodes.sort_unstable();
+            nodes.dedup();
+        }
+        let middle = nodes.iter().map(|&n| own.x[n as usize]).sum::<Vec3>() / nodes.len() as f64;
+        Self { nodes, middle }
+    }
+
+    fn holds(&self, node: u32) -> bool {
+        self.nodes.binary_search(&node).is_ok()
+    }
+
+    fn meets(&self, other: &Self) -> bool {
+        self.nodes.iter().any(|&n| other.holds(n))
+    }
+
+    /// Whether a surface node of this part is in the other, deep under that one's surface.
+    fn is_deep_in(&self, other: &Self, own: &SoftSurface<'_>) -> bool {
+        let surface = &own.model.surface;
+        let around = own.model.tetrahedra.iter().filter(|tet| tet.iter().all(|&n| other.holds(n)));
+        let around: Vec<_> = around.map(|tet| tet.map(|n| own.x[n as usize])).collect();
+        let of_surface = |n: &&u32| surface.index_of_node[**n as usize] != u32::MAX;
+        self.nodes.iter().filter(of_surface).map(|&n| own.x[n as usize]).any(|p| {
+            around.iter().any(|tet| tetrahedron_holds(tet, &p))
+                && (0..surface.triangles.len() as u32)
+                    .filter(|&t| !surface.triangles[t as usize].iter().any(|&n| self.holds(n)))
+                    .all(|t| distance(own, t, &p) > DEEP * surface.mean_edge)
+        })
+    }
+}
+
+fn distance(s: &SoftSurface<'_>, t: u32, p: &Vec3) -> f64 {
+    let [a, b, c] = corners(s, t).each_ref().map(to_real);
+    f64::from(Triangle::new(a, b, c).distance_to_local_point(to_real(p), true))
 }
 
 fn corners(s: &SoftSurface<'_>, t: u32) -> [Vec3; 3] {
@@ -70,10 +172,6 @@ fn is_deep(own: &SoftSurface<'_>, other: &SoftSurface<'_>) -> bool {
     let nodes = own.model.surface.nodes.iter().map(|&n| own.x[n as usize]);
     nodes.filter(|p| (0..3).all(|k| p[k] > low[k] && p[k] < high[k])).any(|p| {
         let inside = other.model.tetrahedra.iter().any(|tet| holds(tet, &p));
-        inside
-            && (0..other.model.surface.triangles.len() as u32).all(|t| {
-                let [a, b, c] = corners(other, t).each_ref().map(to_real);
-                f64::from(Triangle::new(a, b, c).distance_to_local_point(to_real(&p), true)) > depth
-            })
+        inside && (0..other.model.surface.triangles.len() as u32).all(|t| distance(other, t, &p) > depth)
     })
 }
