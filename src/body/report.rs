@@ -9,6 +9,7 @@ pub(crate) struct StepReport {
     pub residual: f64,
     pub tolerance: f64,
     pub guard_retries: usize,
+    pub gave_up: bool,
     pub quarantined: bool,
 }
 
@@ -26,6 +27,12 @@ impl DeformableBody {
     /// Whether the last step ended below its tolerance.
     pub fn last_converged(&self) -> bool {
         self.report.residual <= self.report.tolerance
+    }
+
+    /// Whether the last step was given up: the body found only steps that would have made energy, as where it is pinched
+    /// to a film, or to strain by what it ran into, and went on as a whole with its mean velocity.
+    pub fn last_gave_up(&self) -> bool {
+        self.report.gave_up
     }
 
     /// How often the last step had to be done again because it would have raised the energy: without the quasi-Newton

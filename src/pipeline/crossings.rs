@@ -26,7 +26,7 @@ pub(super) struct Crossings {
 impl Crossings {
     /// Stops the nodes of a body, the one at place `local` of its island, after its step of `h` \[s\]. A body that has
     /// given the step up, or that stopping nodes would strain by more than they bring along, goes on as a
-    /// whole and is stopped so.
+    /// whole and is stopped so: true then.
     pub fn stop<'a>(
         &mut self,
         body: &mut DeformableBody,
@@ -35,7 +35,7 @@ impl Crossings {
         local: usize,
         obstacles: impl Iterator<Item = &'a Obstacle> + Clone,
         h: f64,
-    ) {
+    ) -> bool {
         self.touching.clear();
         for row in rows.iter().filter(|_| !problem.gave_up) {
             if let Side::Soft { body, nodes, weights } = row.sides[0]
@@ -52,7 +52,7 @@ impl Crossings {
             in_parts &= self.stops.is_empty() || self.stop_nodes(body, h);
         }
         if in_parts {
-            return;
+            return false;
         }
         self.touching.clear();
         let shift = problem.mean_shift();
@@ -69,6 +69,7 @@ impl Crossings {
             self.find(body, problem, obstacle, 0.0);
             self.stop_whole(body, h);
         }
+        true
     }
 
     /// Nodes without a contact that come into an obstacle; those of the surface if deeper than `missed` mean edges.

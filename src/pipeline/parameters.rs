@@ -90,6 +90,8 @@ pub struct DeformableCounters {
     pub factor_bytes: usize,
     /// Bytes of columns held.
     pub column_bytes: usize,
+    /// Bodies that found no step but one that makes energy, and moved as a whole instead.
+    pub gave_up: usize,
     /// Bodies put aside because their state was not finite.
     pub quarantined: usize,
     /// Whether the step was skipped because dt or gravity was not usable.

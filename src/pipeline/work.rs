@@ -192,7 +192,8 @@ impl BodyWork {
         self.ahead.extend(self.distances.iter().map(|(_, s)| *s));
     }
 
-    /// Stops what has come into obstacles without a contact in a step of `h` \[s\].
+    /// Stops what has come into obstacles without a contact in a step of `h` \[s\]; tells whether the body moved as a
+    /// whole.
     pub fn stop_crossings(
         &mut self,
         body: &mut DeformableBody,
@@ -200,17 +201,10 @@ impl BodyWork {
         local: usize,
         scene: &RapierScene,
         h: f64,
-    ) {
+    ) -> bool {
         let obstacles = self.met.iter().map(|&o| &scene.obstacles[o as usize]);
         let solid = obstacles.filter(|o| !scene.partners.yields(o.partner));
-        self.crossings.stop(
-            body,
-            &island.island.bodies[local],
-            &island.island.contacts.rows,
-            local,
-            solid,
-            h,
-        );
+        self.crossings.stop(body, &island.island.bodies[local], &island.island.contacts.rows, local, solid, h)
     }
 
     /// Takes another place in the step's list.

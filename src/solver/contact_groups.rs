@@ -22,13 +22,20 @@ pub(crate) struct ContactGroups {
     rank: Vec<usize>,
     /// The group at each rank.
     order: Vec<usize>,
+    /// Ends and sizes of the groups that the order was made for: the same ones, the same order.
+    ordered: (Vec<[Option<u64>; 2]>, Vec<usize>),
 }
 
 impl ContactGroups {
     /// Puts the rows into groups, and the groups into an order of least degree.
     pub fn arrange(&mut self, rows: &mut [Row], partners: &Partners) {
         self.find(rows, partners);
-        self.eliminate();
+        if self.ordered.0 != self.ends || self.ordered.1 != self.sizes {
+            self.find_adjacent();
+            self.eliminate();
+            self.ordered.0.clone_from(&self.ends);
+            self.ordered.1.clone_from(&self.sizes);
+        }
         let (group_of_row, rank) = (&self.group_of_row, &self.rank);
         let sorted = group_of_row.windows(2).all(|w| rank[w[0]] <= rank[w[1]]);
         if !sorted {
@@ -64,6 +71,9 @@ impl ContactGroups {
             self.sizes[group] += 1;
             self.group_of_row.push(group);
         }
+    }
+
+    fn find_adjacent(&mut self) {
         let groups = self.ends.len();
         self.adjacent.clear();
         self.adjacent.resize(groups * groups, false);
