@@ -25,6 +25,8 @@ struct Found {
     /// Lowest centre of mass of the cube, and of the box, in units of the size.
     lowest: f64,
     lowest_box: f64,
+    /// Steps that were given up.
+    gave_up: usize,
 }
 
 /// A soft cube of 5 cm (as E = 1e3 wants) thrown on a fixed floor, with a rigid box on top of it that
@@ -64,6 +66,7 @@ fn throw(c: Corner) -> Found {
         finite: true,
         lowest: f64::INFINITY,
         lowest_box: f64::INFINITY,
+        gave_up: 0,
     };
     let mut before = f64::INFINITY;
     for _ in 0..30 {
@@ -71,6 +74,7 @@ fn throw(c: Corner) -> Found {
         let now = energy(&world, &physics);
         found.growth = found.growth.max((now - before) / impact);
         found.excess = found.excess.max((now - start) / impact);
+        found.gave_up += usize::from(world.bodies[soft].last_gave_up());
         found.finite &= now.is_finite() && world.bodies[soft].is_enabled();
         found.lowest = found.lowest.min(world.bodies[soft].center_of_mass()[1] / 0.05);
         found.lowest_box = found.lowest_box.min(f64::from(physics.bodies[load].translation().y) / 0.05);
@@ -97,14 +101,24 @@ fn no_corner_makes_energy_or_goes_through_the_floor() {
     }
     let thrown: Vec<Found> = corners.par_iter().map(|c| throw(*c)).collect();
     println!(
-        "| E [Pa] | ν | h [s] | rigid : soft | iterations | speed [m/s] | growth | above start | lowest cube | box |"
+        "| E [Pa] | ν | h [s] | rigid : soft | iterations | speed [m/s] | growth | above start | lowest cube | box | given up |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for (c, f) in corners.iter().zip(&thrown) {
         if f.growth > 2e-3 || f.excess > 1e-6 || f.lowest < 0.0 {
             println!(
-                "| {:.0e} | {} | {:.4} | {:.0e} | {} | {} | {:.1e} | {:.1e} | {:.3} | {:.3} |",
-                c.e, c.nu, c.dt, c.ratio, c.iterations, c.speed, f.growth, f.excess, f.lowest, f.lowest_box
+                "| {:.0e} | {} | {:.4} | {:.0e} | {} | {} | {:.1e} | {:.1e} | {:.3} | {:.3} | {} |",
+                c.e,
+                c.nu,
+                c.dt,
+                c.ratio,
+                c.iterations,
+                c.speed,
+                f.growth,
+                f.excess,
+                f.lowest,
+                f.lowest_box,
+                f.gave_up
             );
         }
     }
@@ -118,8 +132,9 @@ fn no_corner_makes_energy_or_goes_through_the_floor() {
         assert!(f.excess < 1e-6, "{c:?}: {f:?}");
         // What a body of this stiffness can carry, in steps of a game.
         let carries = c.e >= 1e6 && c.dt < 0.02 && c.speed == 0.0;
-        assert!(!carries || f.lowest > 0.0, "{c:?}: {f:?}");
-        // Beyond that a crushed cube, pinched between box and floor, comes back in jumps.
+        assert!(!carries || f.lowest > 0.0 && f.gave_up == 0, "{c:?}: {f:?}");
+        // Beyond that a crushed cube, pinched between box and floor, comes back in jumps; rapier's box alone on the
+        // floor gains up to 0.02 at 1/10 s.
         let growth = if carries { 2e-3 } else { 0.1 };
         assert!(c.iterations == 1 || f.growth < growth, "{c:?}: {f:?}");
     }

@@ -73,8 +73,7 @@ impl Clusters {
             (0..3).for_each(|c| columns.extend(y.iter().map(|v| v[c])));
         }
         for batch in columns.chunks_mut(n * BATCH) {
-            let count = batch.len() / n;
-            symbolic.solve_batch(factor, batch, count, scratch);
+            symbolic.solve_batch(factor, batch, scratch);
         }
         let column = |c: usize, axis: usize| &columns[n * (3 * c + axis)..][..n];
         let Z: Vec<Vec<Vec3>> = (0..count)

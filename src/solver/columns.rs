@@ -9,6 +9,9 @@ use crate::body::{DeformableModel, SystemMatrix};
 use crate::math::Mat3;
 use crate::mesh::Surface;
 
+/// Batches that go through the factor together.
+const BATCHES: usize = 4;
+
 /// The surface block of an inverse, as far as it has been asked for.
 #[derive(Debug)]
 pub(crate) struct Columns {
@@ -49,15 +52,16 @@ impl Columns {
         let (d, nodes) = (self.d, &model.surface.nodes);
         let n = d * model.rest.len();
         let mut batch = Vec::new();
-        for chunk in missing.chunks(BATCH / d) {
+        for chunk in missing.chunks(BATCHES * BATCH / d) {
+            let columns = chunk.len().div_ceil(BATCH / d) * BATCH;
             batch.clear();
-            batch.resize(n * BATCH, 0.0);
+            batch.resize(n * columns, 0.0);
             for (k, &s) in chunk.iter().enumerate() {
                 for c in 0..d {
                     batch[n * (d * k + c) + d * nodes[s as usize] as usize + c] = 1.0;
                 }
             }
-            symbolic.solve_batch(factor, &mut batch, BATCH, scratch);
+            symbolic.solve_batch(factor, &mut batch, scratch);
             for (k, &s) in chunk.iter().enumerate() {
                 // A pinned node does not move: its column is zero, not that of its identity row.
                 if pins.binary_search(&nodes[s as usize]).is_ok() {

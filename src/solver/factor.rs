@@ -245,7 +245,7 @@ impl Symbolic {
 
     /// Solves for many columns at once, one after the other in their own order, of which most numbers may
     /// be zero.
-    pub fn solve_batch(&self, factor: &Factor, rhs: &mut [f64], columns: usize, scratch: &mut FactorScratch) {
+    pub fn solve_batch(&self, factor: &Factor, rhs: &mut [f64], scratch: &mut FactorScratch) {
         let d = self.d;
         let n = d * self.order.len();
         if !matches!(factor, Factor::Double(_) | Factor::Single(_)) {
@@ -256,66 +256,83 @@ impl Symbolic {
         }
         let mut ordered = std::mem::take(&mut scratch.ordered);
         ordered.clear();
-        for column in rhs.chunks_exact(n) {
-            ordered.extend(self.order.iter().flat_map(|&old| &column[d * old..d * (old + 1)]));
+        ordered.resize(rhs.len(), 0.0);
+        for (x, column) in ordered.chunks_exact_mut(n).zip(rhs.chunks_exact(n)) {
+            for (&old, x) in self.order.iter().zip(x.chunks_exact_mut(d)) {
+                x.iter_mut().zip(&column[d * old..]).for_each(|(x, v)| *x = *v);
+            }
         }
-        match factor {
-            Factor::Double(values) => self.solve_panels(values, &mut ordered, columns, scratch),
-            Factor::Single(values) => self.solve_panels(values, &mut ordered, columns, scratch),
+        match (factor, d) {
+            (Factor::Double(values), 1) => self.solve_panels::<_, 1>(values, &mut ordered, scratch),
+            (Factor::Double(values), _) => self.solve_panels::<_, 3>(values, &mut ordered, scratch),
+            (Factor::Single(values), 1) => self.solve_panels::<_, 1>(values, &mut ordered, scratch),
+            (Factor::Single(values), _) => self.solve_panels::<_, 3>(values, &mut ordered, scratch),
             _ => {}
         }
         for (column, x) in rhs.chunks_exact_mut(n).zip(ordered.chunks_exact(n)) {
             for (&old, x) in self.order.iter().zip(x.chunks_exact(d)) {
-                column[d * old..d * (old + 1)].copy_from_slice(x);
+                column[d * old..].iter_mut().zip(x).for_each(|(v, x)| *v = *x);
             }
         }
         scratch.ordered = ordered;
     }
 
-    fn solve_panels<T: Entry>(
+    /// [`BATCH`] columns at a time, D unknowns per node.
+    fn solve_panels<T: Entry, const D: usize>(
         &self,
         values: &[T],
         x: &mut [f64],
-        columns: usize,
         scratch: &mut FactorScratch,
     ) {
-        let d = self.d;
-        let n = d * self.order.len();
+        let n = D * self.order.len();
         let count = self.supernodes.count();
         let FactorScratch { gathered, panel, .. } = scratch;
         let places = (0..count).map(|s| (s, true)).chain((0..count).rev().map(|s| (s, false)));
         for (s, forward) in places {
             let (own, rows) = self.supernodes.nodes(s);
-            let m = d * (own.len() + rows.len());
-            let own = d * own.start..d * own.end;
-            // Where a right-hand side is still zero, so is the solution.
-            if forward && (0..columns).all(|c| x[c * n..][own.clone()].iter().all(|v| *v == 0.0)) {
-                continue;
-            }
-            self.supernodes.unpack(s, values, panel);
-            let M = MatRef::from_column_major_slice(panel, m, own.len());
-            gathered.clear();
-            if forward {
-                gathered.resize(m * columns, 0.0);
-                let top = MatRef::from_column_major_slice(x, n, columns).subrows(own.start, own.len());
-                let product = MatMut::from_column_major_slice_mut(gathered, m, columns);
-                matmul(product, Accum::Replace, M, top, 1.0, Par::Seq);
-                for (g, x) in gathered.chunks_exact(m).zip(x.chunks_exact_mut(n)) {
-                    let (top, below) = g.split_at(own.len());
-                    x[own.clone()].copy_from_slice(top);
-                    for (&row, g) in rows.iter().zip(below.chunks_exact(d)) {
-                        x[d * row..].iter_mut().zip(g).for_each(|(x, g)| *x += g);
+            let m = D * (own.len() + rows.len());
+            let own = D * own.start..D * own.end;
+            let mut is_unpacked = false;
+            for x in x.chunks_mut(n * BATCH) {
+                // Where a right-hand side is still zero, so is the solution.
+                if forward && x.chunks_exact(n).all(|x| x[own.clone()].iter().all(|v| *v == 0.0)) {
+                    continue;
+                }
+                if !is_unpacked {
+                    self.supernodes.unpack(s, values, panel);
+                    is_unpacked = true;
+                }
+                let M = MatRef::from_column_major_slice(panel, m, own.len());
+                let columns = x.len() / n;
+                gathered.clear();
+                if forward {
+                    gathered.resize(m * columns, 0.0);
+                    let top = MatRef::from_column_major_slice(x, n, columns).subrows(own.start, own.len());
+                    let product = MatMut::from_column_major_slice_mut(gathered, m, columns);
+                    matmul(product, Accum::Replace, M, top, 1.0, Par::Seq);
+                    for (g, x) in gathered.chunks_exact(m).zip(x.chunks_exact_mut(n)) {
+                        let (top, below) = g.split_at(own.len());
+                        x[own.clone()].copy_from_slice(top);
+                        for (&row, g) in rows.iter().zip(below.chunks_exact(D)) {
+                            let x = &mut x[D * row..D * (row + 1)];
+                            (0..D).for_each(|k| x[k] += g[k]);
+                        }
                     }
+                } else {
+                    gathered.resize(m * columns, 0.0);
+                    for (g, x) in gathered.chunks_exact_mut(m).zip(x.chunks_exact(n)) {
+                        let (top, below) = g.split_at_mut(own.len());
+                        top.copy_from_slice(&x[own.clone()]);
+                        for (&row, g) in rows.iter().zip(below.chunks_exact_mut(D)) {
+                            let x = &x[D * row..D * (row + 1)];
+                            (0..D).for_each(|k| g[k] = x[k]);
+                        }
+                    }
+                    let known = MatRef::from_column_major_slice(gathered, m, columns);
+                    let mut X = MatMut::from_column_major_slice_mut(x, n, columns);
+                    let top = X.rb_mut().subrows_mut(own.start, own.len());
+                    matmul(top, Accum::Replace, M.transpose(), known, 1.0, Par::Seq);
                 }
-            } else {
-                for x in x.chunks_exact(n) {
-                    gathered.extend_from_slice(&x[own.clone()]);
-                    gathered.extend(rows.iter().flat_map(|&row| &x[d * row..d * (row + 1)]));
-                }
-                let known = MatRef::from_column_major_slice(gathered, m, columns);
-                let mut X = MatMut::from_column_major_slice_mut(x, n, columns);
-                let top = X.rb_mut().subrows_mut(own.start, own.len());
-                matmul(top, Accum::Replace, M.transpose(), known, 1.0, Par::Seq);
             }
         }
     }
@@ -431,7 +448,7 @@ mod tests {
             let b: Vec<f64> =
                 (0..x.len()).map(|k| (0..n).map(|j| at(k % n, j) * x[k / n * n + j]).sum()).collect();
             let mut batch = b.clone();
-            symbolic.solve_batch(&factor, &mut batch, 3 * columns, &mut scratch);
+            symbolic.solve_batch(&factor, &mut batch, &mut scratch);
             let mut single = vec![0.0; x.len()];
             // With one unknown per node three right-hand sides go together.
             let together = n * 3 / d;

@@ -71,7 +71,7 @@ impl Supernodes {
     pub fn pack(&self, s: usize, M: &[f64], values: &mut [f64]) {
         let d = self.d;
         self.for_each_block(s, |packed, place| {
-            values[packed..packed + d].copy_from_slice(&M[place..place + d])
+            values[packed..packed + d].iter_mut().zip(&M[place..]).for_each(|(v, m)| *v = *m);
         });
     }
 
