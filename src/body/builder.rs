@@ -139,7 +139,7 @@ impl DeformableBodyBuilder {
         }
     }
 
-    /// Smooths the tetrahedra over their edges, see [`DeformableModel::smoothed`].
+    /// Smooths the tetrahedra over their edges and nodes, see [`DeformableModel::smoothed`].
     pub fn smoothed(mut self) -> Self {
         self.model = self.model.map(|model| Arc::new((*model).clone().smoothed()));
         self
