@@ -22,10 +22,6 @@ const CLEARLY: f64 = 0.1;
 /// another; `pairs` are triangles whose boxes meet.
 pub(super) fn untangle([a, b]: [&SoftSurface<'_>; 2], pairs: &[(u32, u32)], rows: &mut Vec<Row>) {
     let first = rows.len();
-    let side = |s: &SoftSurface<'_>, t: u32| {
-        let nodes = s.model.surface.triangles[t as usize];
-        Side::Soft { body: s.body, nodes, weights: [1.0 / 3.0; 3] }
-    };
     let middle = |s: &SoftSurface<'_>| s.x.iter().sum::<Vec3>() / s.x.len() as f64;
     let is_same_place = is_same_place(a, b);
     // Bodies in the very same place part in any direction.
@@ -38,9 +34,7 @@ pub(super) fn untangle([a, b]: [&SoftSurface<'_>; 2], pairs: &[(u32, u32)], rows
             is_deep.then(|| (middle(a) - middle(b)).try_normalize(0.0).unwrap_or_else(Vec3::y))
         });
         let Some(apart) = apart else { return };
-        let key = ContactKey { obstacle: b.key, part: tb, feature: ta, slot: SLOT };
-        let depth = a.model.surface.mean_edge.min(b.model.surface.mean_edge);
-        rows.push(Row::new([side(a, ta), side(b, tb)], apart, -depth, key));
+        rows.push(row(a, ta, b, tb, apart));
     }
     rows[first..].sort_unstable_by_key(|row| row.key);
 }
@@ -75,9 +69,7 @@ pub(super) fn untangle_itself(
         }
         // Parts in the very same place part in any direction.
         let apart = (parts[0].middle - parts[1].middle).try_normalize(0.0).unwrap_or_else(Vec3::y);
-        let side = |t: u32| Side::Soft { body: own.body, nodes: triangle(t), weights: [1.0 / 3.0; 3] };
-        let key = ContactKey { obstacle: own.key, part: tb, feature: ta, slot: SLOT };
-        apart_rows.push(Row::new([side(ta), side(tb)], apart, -own.model.surface.mean_edge, key));
+        apart_rows.push(row(own, ta, own, tb, apart));
         let mut place = 0;
         rows.retain(|row| {
             place += 1;
@@ -136,6 +128,17 @@ impl Part {
                     .all(|t| distance(own, t, &p) > DEEP * surface.mean_edge)
         })
     }
+}
+
+/// What draws two triangles apart.
+fn row(a: &SoftSurface<'_>, ta: u32, b: &SoftSurface<'_>, tb: u32, apart: Vec3) -> Row {
+    let side = |s: &SoftSurface<'_>, t: u32| {
+        let nodes = s.model.surface.triangles[t as usize];
+        Side::Soft { body: s.body, nodes, weights: [1.0 / 3.0; 3] }
+    };
+    let key = ContactKey { obstacle: b.key, part: tb, feature: ta, slot: SLOT };
+    let depth = a.model.surface.mean_edge.min(b.model.surface.mean_edge);
+    Row::new([side(a, ta), side(b, tb)], apart, -depth, key)
 }
 
 fn distance(s: &SoftSurface<'_>, t: u32, p: &Vec3) -> f64 {

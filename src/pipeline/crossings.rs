@@ -24,37 +24,31 @@ pub(super) struct Crossings {
 }
 
 impl Crossings {
-    /// Stops the nodes of a body, the one at place `local` of its island, after its step of `h` \[s\]. A body that has
-    /// given the step up, or that stopping nodes would strain by more than they bring along, goes on as a
-    /// whole and is stopped so: true then.
-    pub fn stop<'a>(
-        &mut self,
-        body: &mut DeformableBody,
-        problem: &BodyProblem,
-        rows: &[Row],
-        local: usize,
-        obstacles: impl Iterator<Item = &'a Obstacle> + Clone,
-        h: f64,
-    ) -> bool {
+    /// Takes in the contacts of the body with obstacles.
+    pub fn begin(&mut self, rows: &[Row]) {
         self.touching.clear();
-        for row in rows.iter().filter(|_| !problem.gave_up) {
-            if let Side::Soft { body, nodes, weights } = row.sides[0]
-                && body == local
+        for row in rows {
+            if let Side::Soft { nodes, weights, .. } = row.sides[0]
                 && weights[0] == 1.0
             {
                 self.touching.push(nodes[0]);
             }
         }
         self.touching.sort_unstable();
-        let mut in_parts = !problem.gave_up;
-        for obstacle in obstacles.clone().filter(|_| !problem.gave_up) {
-            self.find(body, problem, obstacle, MISSED);
-            in_parts &= self.stops.is_empty() || self.stop_nodes(body, h);
-        }
-        if in_parts {
+    }
+
+    /// Stops the nodes of a body after its step of `h` \[s\]. A body that has given the step up, or that stopping
+    /// nodes would strain by more than they bring along, goes on as a whole and is stopped so: true then.
+    pub fn stop<'a>(
+        &mut self,
+        body: &mut DeformableBody,
+        problem: &BodyProblem,
+        obstacles: impl Iterator<Item = &'a Obstacle> + Clone,
+        h: f64,
+    ) -> bool {
+        if !problem.gave_up && self.stop_in_parts(body, problem, obstacles.clone(), h) {
             return false;
         }
-        self.touching.clear();
         let shift = problem.mean_shift();
         let DeformableState { x, v, .. } = &mut body.state;
         for ((x, v), start) in x.iter_mut().zip(v).zip(&problem.x_start) {
@@ -65,11 +59,29 @@ impl Crossings {
             body.state.x[pin] = problem.target[pin];
             body.state.v[pin] = (problem.target[pin] - problem.x_start[pin]) / h;
         }
-        for obstacle in obstacles {
-            self.find(body, problem, obstacle, 0.0);
-            self.stop_whole(body, h);
+        // What is pinned is held where it is.
+        if problem.key.pins.is_empty() {
+            self.touching.clear();
+            for obstacle in obstacles {
+                self.find(body, problem, obstacle, 0.0);
+                self.stop_whole(body, h);
+            }
         }
         true
+    }
+
+    /// Node by node; false where that would strain the body too much.
+    fn stop_in_parts<'a>(
+        &mut self,
+        body: &mut DeformableBody,
+        problem: &BodyProblem,
+        mut obstacles: impl Iterator<Item = &'a Obstacle>,
+        h: f64,
+    ) -> bool {
+        obstacles.all(|obstacle| {
+            self.find(body, problem, obstacle, MISSED);
+            self.stops.is_empty() || self.stop_nodes(body, h)
+        })
     }
 
     /// Nodes without a contact that come into an obstacle; those of the surface if deeper than `missed` mean edges.
@@ -121,6 +133,46 @@ impl Crossings {
             let shift = stop.at - x[*node];
             x.iter_mut().for_each(|x| *x += shift);
             v.iter_mut().for_each(|v| *v = stop.slowed(v, h));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::{DeformableBodyBuilder, DeformableBodySet};
+    use crate::contact::PartnerId;
+    use crate::math::{Mat3, Pose64};
+    use parry3d::shape::SharedShape;
+    use rapier3d::math::Vector;
+
+    /// A cube a centimetre deep in a floor, falling, that has given its step up: out as it is if it is free, and
+    /// where its pins are if it is not.
+    #[test]
+    fn bodies_that_give_up_keep_their_shape_and_their_pins() {
+        let pose = Pose64 { rotation: Mat3::identity(), translation: Vec3::new(0.0, -1.0, 0.0) };
+        let shape = SharedShape::cuboid(1.0, 1.0, 1.0);
+        let floor = Obstacle { partner: PartnerId(0), key: 0, part: 0, shape, start: pose, end: pose };
+        for pinned in [false, true] {
+            let mut bodies = DeformableBodySet::new();
+            let builder = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2; 3])
+                .translation(Vector::Y * 0.09)
+                .linvel(Vector::Y * -3.0);
+            let builder = if pinned { builder.pinned(|x| x.y > 0.18) } else { builder };
+            let handle = bodies.insert(builder).unwrap();
+            let body = &mut bodies[handle];
+            let before = body.state.x.clone();
+            let mut problem = BodyProblem::new(body, 0.1, &Vec3::zeros(), &[]);
+            problem.gave_up = true;
+            let mut crossings = Crossings::default();
+            crossings.begin(&[]);
+            assert!(crossings.stop(body, &problem, std::iter::once(&floor), 0.1));
+            let moved = body.state.x[0] - before[0];
+            assert!(body.state.x.iter().zip(&before).all(|(x, b)| (x - b - moved).norm() < 1e-12));
+            let lowest = body.state.x.iter().map(|x| x.y).fold(f64::INFINITY, f64::min);
+            let expected = if pinned { -0.01 } else { CLEARANCE * body.model.surface.mean_edge };
+            assert!((lowest - expected).abs() < 1e-6, "{lowest}");
+            assert!(body.state.v.iter().all(|v| v.y.abs() < 1e-12));
         }
     }
 }

@@ -381,7 +381,8 @@ impl DeformablePipeline {
                 let Some(body) = deformables.get_mut(handle) else { continue };
                 if finite {
                     store(body, work, local, h, &mut self.counters);
-                    body.report.gave_up = self.works[index].stop_crossings(body, work, local, &self.scene, h);
+                    let problem = &work.island.bodies[local];
+                    body.report.gave_up = self.works[index].stop_crossings(body, problem, &self.scene, h);
                     self.counters.gave_up += usize::from(body.report.gave_up);
                     give_forces(&work.island.bodies[local], deformables);
                 } else if !work.island.bodies[local].current.x.iter().all(is_number) {

@@ -176,6 +176,7 @@ impl BodyWork {
             !held || row.sides.iter().any(yields)
         });
         rows.sort_unstable_by_key(|row| row.key);
+        self.crossings.begin(&rows);
         self.rows = rows;
     }
 
@@ -197,14 +198,13 @@ impl BodyWork {
     pub fn stop_crossings(
         &mut self,
         body: &mut DeformableBody,
-        island: &IslandWork,
-        local: usize,
+        problem: &BodyProblem,
         scene: &RapierScene,
         h: f64,
     ) -> bool {
         let obstacles = self.met.iter().map(|&o| &scene.obstacles[o as usize]);
         let solid = obstacles.filter(|o| !scene.partners.yields(o.partner));
-        self.crossings.stop(body, &island.island.bodies[local], &island.island.contacts.rows, local, solid, h)
+        self.crossings.stop(body, problem, solid, h)
     }
 
     /// Takes another place in the step's list.

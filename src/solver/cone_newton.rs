@@ -348,11 +348,9 @@ impl ConeSolver {
     /// Takes the curvature L Lᵀ at u and factors what it leads to; false where that fails.
     fn set_curvature(&mut self, problem: &ConeProblem, u: &[f64], work: &mut ConeWork) -> bool {
         self.hessian.set_curvature(problem, u, &self.R);
-        match self.hessian.factorize(problem) {
-            Some(had_to) => work.factorizations += usize::from(had_to),
-            None => return false,
-        }
-        true
+        let had_to = self.hessian.factorize(problem);
+        work.factorizations += usize::from(had_to == Some(true));
+        had_to.is_some()
     }
 
     /// Turns b in `dz` to `(1 + L Lᵀ W)⁻¹ b`.
