@@ -227,7 +227,7 @@ impl Detector {
                 let turned = t >= surface.closed && self.looks_away(scene, triangle, &corners);
                 let [a, b, c] = corners;
                 let corners = if turned { [a, c, b] } else { corners };
-                let found = corner_on_triangle(corner, &corners, reach, &scene.scales);
+                let found = corner_on_triangle(scene.obstacle, corner, &corners, reach, &scene.scales);
                 let Some((mut weights, row)) = found else { continue };
                 if turned {
                     weights.swap(1, 2);

@@ -5,16 +5,18 @@
 //! overlap: nodes under the face, body edges under its rim, and its own corners. They are found
 //! as such, one by one, so that they are the same ones in every step.
 
-use super::obstacle::Obstacle;
+use super::obstacle::{Obstacle, Solidity};
 use super::surface_point::{Scales, SurfacePoint, is_over_face};
 use super::triangle_rows::barycentric;
-use crate::math::{Vec3, from_real};
+use crate::math::{Vec3, from_real, to_real};
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::Vector;
 use parry3d::shape::{Shape, TypedShape};
 
 /// Cosine beyond which a face looks at the body's surface.
 const FACING: f64 = -0.1;
+/// Share of a way along a contact's normal by which it leads out of the obstacle that presses there.
+const LEADS_OUT: f64 = 0.5;
 /// Halvings of an edge: to 6e-8 of its length, the resolution of `f32`.
 const HALVINGS: usize = 24;
 /// Nearer to the node than this part of the edge the node's own row serves.
@@ -85,8 +87,9 @@ pub(crate) fn corners_in(obstacle: &Obstacle, region: &Aabb, found: &mut Vec<(u3
 
 /// The row of an obstacle's corner on a triangle of the body with these `corners`, and the weights
 /// of their nodes in it; `None` if the corner is not over the triangle, or further than `reach` from
-/// it.
+/// it, or the triangle is the back of a body so thin that the corner is near it from the other side.
 pub(crate) fn corner_on_triangle(
+    obstacle: &Obstacle,
     corner: &Vec3,
     corners: &[Vec3; 3],
     reach: f64,
@@ -99,5 +102,48 @@ pub(crate) fn corner_on_triangle(
     }
     let weights = barycentric(corners, corner)?;
     let row = SurfacePoint { point: *corner, normal: -outward, gap, flat: false };
-    weights.iter().all(|w| *w >= 0.0).then_some((weights, row))
+    (weights.iter().all(|w| *w >= 0.0) && leads_out(obstacle, corner, &row.normal, scales))
+        .then_some((weights, row))
+}
+
+/// Whether an obstacle can press at its corner along a normal: whether that leads out of it.
+fn leads_out(obstacle: &Obstacle, corner: &Vec3, normal: &Vec3, scales: &Scales) -> bool {
+    let ahead = corner + normal * scales.shift;
+    let distance = obstacle.shape.distance_to_local_point(to_real(&ahead), true);
+    obstacle.solidity() == Solidity::Sheet || f64::from(distance) >= LEADS_OUT * scales.shift
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::PartnerId;
+    use crate::math::{Mat3, Pose64};
+    use parry3d::shape::SharedShape;
+    use proptest::prelude::*;
+
+    const SCALES: Scales = Scales { band: 1e-5, shift: 0.01 };
+
+    fn obstacle(shape: SharedShape) -> Obstacle {
+        let start = Pose64 { rotation: Mat3::identity(), translation: Vec3::zeros() };
+        Obstacle { partner: PartnerId(0), key: 0, part: 0, shape, start, end: start }
+    }
+
+    proptest! {
+        /// A box stands, a little tilted, on a film thinner than what tells inside from outside: on its upper side
+        /// only.
+        #[test]
+        fn corners_do_not_stand_on_the_back_of_a_film(tilt in -0.2f64..0.2, turn in 0.0..6.28, thickness in 0.0..0.018, half in 0.02..0.5f32) {
+            let cuboid = obstacle(SharedShape::cuboid(0.5, half, 0.5));
+            let corner = Vec3::new(0.5, -f64::from(half), -0.5);
+            let up = Vec3::new(tilt * f64::cos(turn), 1.0, tilt * f64::sin(turn)).normalize();
+            let [u, v] = crate::math::tangents(&up);
+            let film = |depth: f64| [-u - v, u - v, v].map(|d| corner - up * depth + d * 0.1);
+            let [a, b, c] = film(thickness);
+            let (upper, lower) = (film(0.0), [a, c, b]);
+            let (weights, row) = corner_on_triangle(&cuboid, &corner, &upper, 0.05, &SCALES).unwrap();
+            prop_assert!((row.normal + up).norm() < 1e-6 && row.gap.abs() < 1e-6);
+            prop_assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-6);
+            prop_assert!(corner_on_triangle(&cuboid, &corner, &lower, 0.05, &SCALES).is_none());
+        }
+    }
 }

@@ -37,8 +37,9 @@ impl Crossings {
         self.touching.sort_unstable();
     }
 
-    /// Stops the nodes of a body after its step of `h` \[s\]. A body that has given the step up, or that stopping
-    /// nodes would strain by more than they bring along, goes on as a whole and is stopped so: true then.
+    /// Stops the nodes of a body after its step of `h` \[s\]. A body that stopping nodes would strain by more than they
+    /// bring along goes on as it was, by its mean velocity, and is stopped as a whole, as one that has given
+    /// the step up: true then.
     pub fn stop<'a>(
         &mut self,
         body: &mut DeformableBody,
@@ -46,22 +47,24 @@ impl Crossings {
         obstacles: impl Iterator<Item = &'a Obstacle> + Clone,
         h: f64,
     ) -> bool {
-        if !problem.gave_up && self.stop_in_parts(body, problem, obstacles.clone(), h) {
-            return false;
-        }
-        let shift = problem.mean_shift();
-        let DeformableState { x, v, .. } = &mut body.state;
-        for ((x, v), start) in x.iter_mut().zip(v).zip(&problem.x_start) {
-            (*x, *v) = (start + shift, shift / h);
-        }
-        for &pin in &problem.key.pins {
-            let pin = pin as usize;
-            body.state.x[pin] = problem.target[pin];
-            body.state.v[pin] = (problem.target[pin] - problem.x_start[pin]) / h;
+        if !problem.gave_up {
+            if self.stop_in_parts(body, problem, obstacles.clone(), h) {
+                return false;
+            }
+            let shift = problem.mean_shift();
+            let DeformableState { x, v, .. } = &mut body.state;
+            for ((x, v), start) in x.iter_mut().zip(v).zip(&problem.x_start) {
+                (*x, *v) = (start + shift, shift / h);
+            }
+            for &pin in &problem.key.pins {
+                let pin = pin as usize;
+                body.state.x[pin] = problem.target[pin];
+                body.state.v[pin] = (problem.target[pin] - problem.x_start[pin]) / h;
+            }
+            self.touching.clear();
         }
         // What is pinned is held where it is.
         if problem.key.pins.is_empty() {
-            self.touching.clear();
             for obstacle in obstacles {
                 self.find(body, problem, obstacle, 0.0);
                 self.stop_whole(body, h);

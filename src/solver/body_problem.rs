@@ -53,7 +53,7 @@ pub(crate) struct BodyProblem {
     /// Factor c ≥ 1 on A, raised by the guard.
     pub scaling: f64,
     pub guard_retries: usize,
-    /// No step was found that does not make energy: the body moves as a whole.
+    /// The step would have made energy: the body moves as a whole.
     pub gave_up: bool,
     /// A force that counts as large for this body \[N\].
     pub weight: f64,
@@ -205,10 +205,15 @@ impl BodyProblem {
     pub fn free_step(&mut self, factor: &SystemFactor) {
         let mut force = std::mem::take(&mut self.force);
         self.free_residual(&mut force);
-        self.trial.x.clone_from(&self.current.x);
-        self.metric.apply(factor, &force, &mut self.step);
-        self.add_step();
+        self.step_by(factor, &force);
         self.force = force;
+    }
+
+    /// Sets the trial to `x + P f/c`.
+    pub(super) fn step_by(&mut self, factor: &SystemFactor, force: &[Vec3]) {
+        self.trial.x.clone_from(&self.current.x);
+        self.metric.apply(factor, force, &mut self.step);
+        self.add_step();
     }
 
     /// Adds `P Jᵀ(λ − λ⁰)/c` to the trial.

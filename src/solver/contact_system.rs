@@ -205,15 +205,7 @@ impl ContactSystem {
         }
         let changed = self.before != self.lambda;
         if changed {
-            for body in bodies.iter_mut() {
-                body.contact_change.clone_from(&body.contact_force);
-            }
-            self.lay_forces(bodies);
-            for body in bodies.iter_mut() {
-                for (change, force) in body.contact_change.iter_mut().zip(&body.contact_force) {
-                    *change = force - *change;
-                }
-            }
+            self.lay_changes(bodies);
         }
         (work, changed)
     }
@@ -249,20 +241,37 @@ impl ContactSystem {
         sum
     }
 
-    /// Takes the forces from all that acts on a body, and from what is between rigid bodies: rapier's own solver
-    /// then has all of that.
-    pub fn release(&mut self, index: usize) {
+    /// Begins anew with what acts on a body, and with what is between rigid bodies: without forces, and so that nothing
+    /// is drawn apart.
+    pub fn restart(&mut self, index: usize) {
         let is_rigid = |side: &Side| !matches!(side, Side::Soft { .. });
-        for (i, row) in self.rows[..self.active].iter().enumerate() {
-            if row.sides.iter().any(|side| side.is_of(index)) || row.sides.iter().all(is_rigid) {
+        for (i, row) in self.rows.iter_mut().enumerate() {
+            let is_own = row.sides.iter().any(|side| side.is_of(index));
+            if is_own && row.compliance == 0.0 {
+                row.goal = if let Law::Held { .. } = row.law { 0.0 } else { row.goal.max(0.0) };
+            }
+            if i < self.active && (is_own || row.sides.iter().all(is_rigid)) {
                 self.lambda[self.problem.offsets[i]..self.problem.offsets[i + 1]].fill(0.0);
                 self.shift[i] = 0.0;
             }
         }
     }
 
+    /// Lays the forces on the nodes; what that changes goes to the bodies' `contact_change`.
+    pub fn lay_changes(&self, bodies: &mut [BodyProblem]) {
+        for body in bodies.iter_mut() {
+            body.contact_change.clone_from(&body.contact_force);
+        }
+        self.lay_forces(bodies);
+        for body in bodies.iter_mut() {
+            for (change, force) in body.contact_change.iter_mut().zip(&body.contact_force) {
+                *change = force - *change;
+            }
+        }
+    }
+
     /// Lays the forces on the nodes.
-    pub fn lay_forces(&self, bodies: &mut [BodyProblem]) {
+    fn lay_forces(&self, bodies: &mut [BodyProblem]) {
         for body in bodies.iter_mut() {
             body.contact_force.fill(Vec3::zeros());
         }

@@ -9,13 +9,6 @@ const MAX_BALANCING_TURN: f64 = 0.1;
 /// Largest rotation \[rad\] in a step that [`BodyProblem::end_velocities`] gives back.
 const MAX_SPIN_GIVEN: f64 = 0.5;
 
-/// Share of a body's energy by which [`BodyProblem::gains_energy`] forgives a few iterations: those of one iteration
-/// gain up to 3 % in a step and lose it in the next ones.
-const MAX_GAIN: f64 = 0.1;
-
-/// As [`MAX_GAIN`], of the work that contacts do on the body.
-const MAX_GAIN_OF_WORK: f64 = 1.0e-3;
-
 impl BodyProblem {
     /// Moves and turns a body that nothing holds as a whole, so that its residual has neither force nor
     /// moment: what is left of it after a few iterations would set the body spinning. Deforms nothing.
@@ -35,43 +28,6 @@ impl BodyProblem {
         let turn = if turn.norm() < MAX_BALANCING_TURN { turn } else { Vec3::zeros() };
         let (rotation, shift) = (rotation_from_vector(&turn), force * (mobility / total));
         x.iter_mut().for_each(|x| *x = centre + shift + rotation * (*x - centre));
-    }
-
-    /// Whether the step would make energy out of nothing: for forces λ of the contacts, implicit Euler ends with
-    /// `Ψ(x) − λᵀJx` no higher than where it began [cf. Hairer et al. 2006], and what they give to the body
-    /// their other sides lose, but for what contacts make themselves, `by_contacts` \[J\], by drawing overlaps apart.
-    pub fn gains_energy(&mut self, by_contacts: f64) -> bool {
-        let by_contact: f64 = (self.current.x.iter().zip(&self.x_start).zip(&self.contact_force))
-            .map(|((x, start), f)| (x - start).dot(f))
-            .sum();
-        let mut still = std::mem::take(&mut self.trial);
-        still.x.clone_from(&self.x_start);
-        self.key.pins.iter().for_each(|&p| still.x[p as usize] = self.target[p as usize]);
-        self.evaluate(&mut still, f64::INFINITY);
-        let gained = self.current.objective - by_contact - still.objective + by_contacts.max(0.0);
-        let allowed = MAX_GAIN * still.objective + MAX_GAIN_OF_WORK * by_contact.abs();
-        self.trial = still;
-        // Written so that what is not a number counts as gained.
-        !(gained <= allowed)
-    }
-
-    /// Gives the step up: the body keeps its shape and goes on with its mean velocity.
-    pub fn move_as_a_whole(&mut self) {
-        self.gave_up = true;
-        let shift = self.mean_shift();
-        self.current.x.clear();
-        self.current.x.extend(self.x_start.iter().map(|x| x + shift));
-        self.key.pins.iter().for_each(|&p| self.current.x[p as usize] = self.target[p as usize]);
-        self.evaluate_current();
-    }
-
-    /// How far the body goes as a whole if nothing touches it \[m\]; not at all if it is pinned.
-    pub fn mean_shift(&self) -> Vec3 {
-        if !self.key.pins.is_empty() {
-            return Vec3::zeros();
-        }
-        let moved = self.target.iter().zip(&self.x_start).zip(&self.masses);
-        moved.map(|((to, from), m)| (to - from) * *m).sum::<Vec3>() / self.masses.iter().sum::<f64>()
     }
 
     /// Velocities at the end of the step [m/s]; `in_flight` tells that nothing touched or tied the body. Implicit

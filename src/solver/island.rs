@@ -108,31 +108,62 @@ impl Island {
         if self.contacts.is_empty() {
             self.bodies.iter_mut().filter(|b| b.key.pins.is_empty()).for_each(BodyProblem::balance);
         } else {
-            self.give_up_what_gains_energy(partners, h);
+            self.give_up_what_gains_energy(factors, partners, h, limits);
         }
         self.bodies.iter().for_each(|b| self.report.effort.add(&b.metric.effort));
     }
 
-    /// Bodies whose step is far from solved and would gain energy move as a whole, and nothing acts on them: where
-    /// forces change wildly from iteration to iteration, what they have done to a body is not what the
-    /// last ones take from others.
-    fn give_up_what_gains_energy(&mut self, partners: &Partners, h: f64) {
-        let mut gave_up = false;
+    /// Bodies whose step is far from solved and would gain energy keep their shape instead, and contacts are solved again
+    /// with them: where forces change wildly from iteration to iteration, what they have done to a body is
+    /// not what the last ones take from others.
+    fn give_up_what_gains_energy(
+        &mut self,
+        factors: &FactorCache,
+        partners: &Partners,
+        h: f64,
+        limits: &ContactLimits,
+    ) {
+        while self.find_gains(partners, h) {
+            self.contacts.lay_changes(&mut self.bodies);
+            let own = Factors { cache: factors, tangents: &self.tangents };
+            for (index, body) in self.bodies.iter_mut().enumerate() {
+                let factor = own.of(index, body);
+                if body.gave_up {
+                    body.begin_as_a_whole(factor);
+                } else {
+                    body.trial.x.clone_from(&body.current.x);
+                    body.contact_step(factor);
+                }
+            }
+            self.assembly = Assembly::Anew;
+            self.solve_contacts(factors, partners, h, limits);
+            for body in &mut self.bodies {
+                if body.gave_up {
+                    body.end_as_a_whole();
+                } else {
+                    body.evaluate_trial();
+                    body.accept_trial();
+                }
+            }
+        }
+    }
+
+    /// Marks bodies that would gain energy; false if there are none.
+    fn find_gains(&mut self, partners: &Partners, h: f64) -> bool {
+        let mut found = false;
         for index in 0..self.bodies.len() {
             let body = &self.bodies[index];
-            if body.residual() <= FAR_FROM_SOLVED * body.force_scale() {
+            if body.gave_up || body.residual() <= FAR_FROM_SOLVED * body.force_scale() {
                 continue;
             }
             let by_contacts = self.contacts.made_energy(index, &self.bodies, partners, h);
             if self.bodies[index].gains_energy(by_contacts) {
-                self.bodies[index].move_as_a_whole();
-                self.contacts.release(index);
-                gave_up = true;
+                self.bodies[index].gave_up = true;
+                self.contacts.restart(index);
+                found = true;
             }
         }
-        if gave_up {
-            self.contacts.lay_forces(&mut self.bodies);
-        }
+        found
     }
 
     /// One iteration.

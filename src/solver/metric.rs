@@ -11,6 +11,7 @@ use super::clusters::TurnedClusters;
 use super::effort::Effort;
 use super::factor::FactorScratch;
 use super::factor_cache::SystemFactor;
+use super::whole::RigidMode;
 use crate::body::elastic::node_rotations;
 use crate::body::{DeformableModel, SystemMatrix};
 use crate::math::lanes::Lane;
@@ -27,6 +28,7 @@ pub(crate) struct Metric {
     floating: Mat3,
     per_node: Vec<Mat3>,
     deflation: Deflation,
+    rigid: RigidMode,
     clusters: TurnedClusters,
     /// The clusters take part.
     turns: bool,
@@ -65,8 +67,14 @@ struct Deflation {
 }
 
 impl Metric {
+    /// The body keeps its shape.
+    pub fn set_rigid(&mut self, x: &[Vec3], masses: &[f64], mobility: f64) {
+        self.rigid.set(x, masses, mobility);
+    }
+
     /// The scalar matrix: no frames.
     pub fn set_isotropic(&mut self) {
+        self.rigid.active = false;
         self.kind = FrameKind::Isotropic;
         self.turns = false;
         self.floating = Mat3::identity();
@@ -75,6 +83,7 @@ impl Metric {
 
     /// One frame for the body.
     pub fn set_floating(&mut self, rotation: &Mat3) {
+        self.rigid.active = false;
         self.kind = FrameKind::Floating;
         self.turns = false;
         self.floating = rounded_rotation(rotation, FRAME_BITS);
@@ -122,6 +131,7 @@ impl Metric {
         factor: &SystemFactor,
     ) {
         self.kind = FrameKind::PerNode;
+        self.rigid.active = false;
         self.turns = false;
         self.per_node.resize(x.len(), Mat3::zeros());
         node_rotations(model, x, &mut self.per_node);
@@ -169,6 +179,9 @@ impl Metric {
 
     /// `out = P r`: displacements \[m\] of forces \[N\].
     pub fn apply(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
+        if self.rigid.active {
+            return self.rigid.apply(r, out);
+        }
         if !self.deflation.active {
             self.rotate_and_solve(factor, r, out);
             if let Some(clusters) = factor.clusters.as_ref().filter(|_| self.turns) {
@@ -223,6 +236,9 @@ impl Metric {
 
     /// The block of P between two surface nodes, given the one of `A⁻¹` [m/N].
     pub fn compliance(&self, factor: &SystemFactor, inverse_block: &Mat3, i: usize, j: usize) -> Mat3 {
+        if self.rigid.active {
+            return self.rigid.compliance(i, j);
+        }
         let block = match self.kind {
             FrameKind::Isotropic if self.turns => match &factor.clusters {
                 Some(clusters) => inverse_block + self.clusters.compliance(clusters, i, j),
@@ -243,7 +259,7 @@ impl Metric {
     /// The one frame of the body, if it has one and that is all there is to its blocks.
     pub fn one_frame(&self) -> Option<Mat3> {
         match self.kind {
-            _ if self.deflation.active || self.turns => None,
+            _ if self.rigid.active || self.deflation.active || self.turns => None,
             FrameKind::Isotropic => Some(Mat3::identity()),
             FrameKind::Floating => Some(self.floating),
             FrameKind::PerNode => None,
@@ -252,7 +268,7 @@ impl Metric {
 
     /// Whether every node has a frame of its own, as in bodies that bend.
     pub fn is_per_node(&self) -> bool {
-        self.kind == FrameKind::PerNode
+        self.kind == FrameKind::PerNode && !self.rigid.active
     }
 }
 

@@ -31,6 +31,7 @@ mod system;
 mod tangent;
 #[cfg(test)]
 mod tests;
+mod whole;
 
 pub(crate) use body_problem::{BodyProblem, SECOND_ORDER};
 pub(crate) use contact_system::ContactLimits;

@@ -1,0 +1,121 @@
+//! Steps that would make energy out of nothing are given up: the body keeps its shape and moves as a rigid one, in
+//! contact with what it touches. Among rigid bodies contacts only ever take energy.
+
+use super::body_problem::BodyProblem;
+use super::factor_cache::SystemFactor;
+use crate::math::{Mat3, Vec3, skew, solve_semidefinite};
+
+/// Share of a body's energy by which [`BodyProblem::gains_energy`] forgives a few iterations: those of one iteration
+/// gain up to 3 % in a step and lose it in the next ones.
+const MAX_GAIN: f64 = 0.1;
+
+/// As [`MAX_GAIN`], of the work that contacts do on the body.
+const MAX_GAIN_OF_WORK: f64 = 1.0e-3;
+
+/// Factor on A of pinned bodies that keep their shape: they yield next to nothing.
+const STIFFENING: f64 = 1024.0;
+
+/// How a body moves that keeps its shape: displacements about its centre of mass.
+#[derive(Default)]
+pub(super) struct RigidMode {
+    pub active: bool,
+    arms: Vec<Vec3>,
+    /// `h²/(1 + αh)` over mass and inertia [m/N, 1/(N m)].
+    by_force: f64,
+    by_moment: Mat3,
+}
+
+impl RigidMode {
+    /// Of masses at `x`, with a mobility of `h²/(1 + αh)` [s²].
+    pub fn set(&mut self, x: &[Vec3], masses: &[f64], mobility: f64) {
+        let total: f64 = masses.iter().sum();
+        let centre = x.iter().zip(masses).map(|(x, m)| x * *m).sum::<Vec3>() / total;
+        self.arms.clear();
+        self.arms.extend(x.iter().map(|x| x - centre));
+        let inertia = self.arms.iter().zip(masses).fold(Mat3::zeros(), |sum, (arm, m)| {
+            sum + (Mat3::identity() * arm.norm_squared() - arm * arm.transpose()) * *m
+        });
+        self.by_force = mobility / total;
+        for c in 0..3 {
+            self.by_moment.set_column(c, &(solve_semidefinite(&inertia, &Vec3::ith(c, 1.0)) * mobility));
+        }
+        self.active = true;
+    }
+
+    /// Displacements \[m\] of forces \[N\] on the nodes.
+    pub fn apply(&self, forces: &[Vec3], out: &mut [Vec3]) {
+        let (mut force, mut moment) = (Vec3::zeros(), Vec3::zeros());
+        for (f, arm) in forces.iter().zip(&self.arms) {
+            force += f;
+            moment += arm.cross(f);
+        }
+        let (shift, turn) = (force * self.by_force, self.by_moment * moment);
+        for (out, arm) in out.iter_mut().zip(&self.arms) {
+            *out = shift + turn.cross(arm);
+        }
+    }
+
+    /// The block between two nodes [m/N].
+    pub fn compliance(&self, i: usize, j: usize) -> Mat3 {
+        Mat3::from_diagonal_element(self.by_force)
+            - skew(&self.arms[i]) * self.by_moment * skew(&self.arms[j])
+    }
+}
+
+impl BodyProblem {
+    /// Whether the step would make energy out of nothing: for forces λ of the contacts, implicit Euler ends with
+    /// `Ψ(x) − λᵀJx` no higher than where it began [cf. Hairer et al. 2006], and what they give to the body
+    /// their other sides lose, but for what contacts make themselves, `by_contacts` \[J\], by drawing overlaps apart.
+    pub fn gains_energy(&mut self, by_contacts: f64) -> bool {
+        let by_contact: f64 = (self.current.x.iter().zip(&self.x_start).zip(&self.contact_force))
+            .map(|((x, start), f)| (x - start).dot(f))
+            .sum();
+        let mut still = std::mem::take(&mut self.trial);
+        still.x.clone_from(&self.x_start);
+        self.key.pins.iter().for_each(|&p| still.x[p as usize] = self.target[p as usize]);
+        self.evaluate(&mut still, f64::INFINITY);
+        let gained = self.current.objective - by_contact - still.objective + by_contacts.max(0.0);
+        let allowed = MAX_GAIN * still.objective + MAX_GAIN_OF_WORK * by_contact.abs();
+        self.trial = still;
+        // Written so that what is not a number counts as gained.
+        !(gained <= allowed)
+    }
+
+    /// Gives the step up: sets the trial to where the body goes in its shape under the present contact forces, from
+    /// where it was at the start.
+    pub fn begin_as_a_whole(&mut self, factor: &SystemFactor) {
+        self.current.x.clone_from(&self.x_start);
+        self.key.pins.iter().for_each(|&p| self.current.x[p as usize] = self.target[p as usize]);
+        let mut forces = std::mem::take(&mut self.force);
+        forces.clone_from(&self.contact_force);
+        if self.key.pins.is_empty() {
+            let mobility = self.h * self.h / (1.0 + self.material.mass_damping * self.h);
+            self.metric.set_rigid(&self.x_start, &self.masses, mobility);
+            self.scaling = 1.0;
+            for (i, force) in forces.iter_mut().enumerate() {
+                *force += (self.target[i] - self.x_start[i]) * (self.masses[i] / (self.h * self.h));
+            }
+        } else {
+            self.scaling = STIFFENING;
+        }
+        self.step_by(factor, &forces);
+        self.force = forces;
+    }
+
+    /// Ends what [`BodyProblem::begin_as_a_whole`] began, with the trial where contacts have led it: by a finite rotation.
+    pub fn end_as_a_whole(&mut self) {
+        if self.key.pins.is_empty() {
+            self.bend_step_to_rotation();
+            self.accept_trial();
+        }
+        self.evaluate_current();
+    }
+    /// How far the body goes as a whole if nothing touches it \[m\]; not at all if it is pinned.
+    pub fn mean_shift(&self) -> Vec3 {
+        if !self.key.pins.is_empty() {
+            return Vec3::zeros();
+        }
+        let moved = self.target.iter().zip(&self.x_start).zip(&self.masses);
+        moved.map(|((to, from), m)| (to - from) * *m).sum::<Vec3>() / self.masses.iter().sum::<f64>()
+    }
+}
