@@ -14,13 +14,14 @@ const CLEARANCE: f64 = 1.0e-3;
 /// Depth, in mean edges, at which a node of the surface without a contact counts as crossing.
 const MISSED: f64 = 0.05;
 
-/// Memory for it.
+/// Where the nodes of a body are stopped.
 #[derive(Default)]
 pub(super) struct Crossings {
     /// Nodes that contacts with obstacles act on, ascending.
     touching: Vec<u32>,
     stops: Vec<(usize, Stop)>,
-    before: Vec<Vec3>,
+    /// Positions of all nodes after that.
+    x: Vec<Vec3>,
 }
 
 impl Crossings {
@@ -37,63 +38,44 @@ impl Crossings {
         self.touching.sort_unstable();
     }
 
-    /// Stops the nodes of a body after its step of `h` \[s\]. A body that stopping nodes would strain by more than they
-    /// bring along goes on as it was, by its mean velocity, and is stopped as a whole, as one that has given
-    /// the step up: true then.
-    pub fn stop<'a>(
+    /// Looks where the step has led nodes of a body into obstacles; of one that has given the step up and is not pinned,
+    /// where that lets it go as a whole. Returns the energy \[J\] that it takes to stop them.
+    pub fn find<'a>(
         &mut self,
-        body: &mut DeformableBody,
-        problem: &BodyProblem,
-        obstacles: impl Iterator<Item = &'a Obstacle> + Clone,
+        problem: &mut BodyProblem,
+        obstacles: impl Iterator<Item = &'a Obstacle>,
         h: f64,
-    ) -> bool {
-        if !problem.gave_up {
-            if self.stop_in_parts(body, problem, obstacles.clone(), h) {
-                return false;
-            }
-            let shift = problem.mean_shift();
-            let DeformableState { x, v, .. } = &mut body.state;
-            for ((x, v), start) in x.iter_mut().zip(v).zip(&problem.x_start) {
-                (*x, *v) = (start + shift, shift / h);
-            }
-            for &pin in &problem.key.pins {
-                let pin = pin as usize;
-                body.state.x[pin] = problem.target[pin];
-                body.state.v[pin] = (problem.target[pin] - problem.x_start[pin]) / h;
-            }
-            self.touching.clear();
-        }
-        // What is pinned is held where it is.
-        if problem.key.pins.is_empty() {
-            for obstacle in obstacles {
-                self.find(body, problem, obstacle, 0.0);
-                self.stop_whole(body, h);
+    ) -> f64 {
+        self.stops.clear();
+        self.x.clone_from(&problem.current.x);
+        for obstacle in obstacles {
+            let first = self.stops.len();
+            if !problem.gave_up {
+                self.find_nodes(problem, obstacle, MISSED);
+                self.stops[first..].iter().for_each(|(node, stop)| self.x[*node] = stop.at);
+            } else if problem.key.pins.is_empty() {
+                self.find_nodes(problem, obstacle, 0.0);
+                self.keep_deepest(first);
             }
         }
-        true
-    }
-
-    /// Node by node; false where that would strain the body too much.
-    fn stop_in_parts<'a>(
-        &mut self,
-        body: &mut DeformableBody,
-        problem: &BodyProblem,
-        mut obstacles: impl Iterator<Item = &'a Obstacle>,
-        h: f64,
-    ) -> bool {
-        obstacles.all(|obstacle| {
-            self.find(body, problem, obstacle, MISSED);
-            self.stops.is_empty() || self.stop_nodes(body, h)
-        })
+        if self.stops.is_empty() || problem.gave_up {
+            return 0.0;
+        }
+        let lost = |(node, stop): &(usize, Stop)| {
+            let v = (problem.current.x[*node] - problem.x_start[*node]) / h;
+            0.5 * problem.mass(*node) * (v.norm_squared() - stop.slowed(&v, h).norm_squared())
+        };
+        let lost = self.stops.iter().map(lost).sum();
+        problem.strain_energy(&self.x, lost)
     }
 
     /// Nodes without a contact that come into an obstacle; those of the surface if deeper than `missed` mean edges.
-    fn find(&mut self, body: &DeformableBody, problem: &BodyProblem, obstacle: &Obstacle, missed: f64) {
-        self.stops.clear();
+    fn find_nodes(&mut self, problem: &BodyProblem, obstacle: &Obstacle, missed: f64) {
         let swept = obstacle.swept_aabb();
-        let edge = body.model.surface.mean_edge;
-        for (node, (from, to)) in problem.x_start.iter().zip(&body.state.x).enumerate() {
-            let is_inner = body.model.surface.index_of_node[node] == u32::MAX;
+        let surface = &problem.model.surface;
+        let edge = surface.mean_edge;
+        for (node, (from, to)) in problem.x_start.iter().zip(&self.x).enumerate() {
+            let is_inner = surface.index_of_node[node] == u32::MAX;
             let listed = |nodes: &[u32]| nodes.binary_search(&(node as u32)).is_ok();
             let has_contact = !is_inner && listed(&self.touching);
             if has_contact || !comes_near(&swept, from, to) || listed(&problem.key.pins) {
@@ -107,35 +89,29 @@ impl Crossings {
         }
     }
 
-    /// Stops node by node; leaves the body as it was, and tells so, if it would have much more energy then.
-    fn stop_nodes(&mut self, body: &mut DeformableBody, h: f64) -> bool {
-        let before = body.elastic_energy();
-        self.before.clone_from(&body.state.x);
-        let mut lost = 0.0;
-        for (node, stop) in &self.stops {
-            body.state.x[*node] = stop.at;
-            let v = &body.state.v[*node];
-            lost += 0.5 * body.node_mass(*node) * (v.norm_squared() - stop.slowed(v, h).norm_squared());
+    /// Of the stops from `first` on leaves the deepest, and shifts the body out by it.
+    fn keep_deepest(&mut self, first: usize) {
+        let depth = |(node, stop): &(usize, Stop)| (stop.at - self.x[*node]).norm();
+        let deepest = self.stops.drain(first..).max_by(|a, b| depth(a).total_cmp(&depth(b)));
+        if let Some((node, stop)) = deepest {
+            let shift = stop.at - self.x[node];
+            self.x.iter_mut().for_each(|x| *x += shift);
+            self.stops.push((node, stop));
         }
-        if body.elastic_energy() > 2.0 * before + lost {
-            body.state.x.clone_from(&self.before);
-            return false;
-        }
-        for (node, stop) in &self.stops {
-            body.state.v[*node] = stop.slowed(&body.state.v[*node], h);
-        }
-        true
     }
 
-    /// Shifts the body out by its deepest node.
-    fn stop_whole(&self, body: &mut DeformableBody, h: f64) {
+    /// Stops what was found in a step of `h` \[s\].
+    pub fn stop(&self, body: &mut DeformableBody, gave_up: bool, h: f64) {
         let DeformableState { x, v, .. } = &mut body.state;
-        let depth = |(node, stop): &&(usize, Stop)| (stop.at - x[*node]).norm();
-        let deepest = self.stops.iter().max_by(|a, b| depth(a).total_cmp(&depth(b)));
-        if let Some((node, stop)) = deepest {
-            let shift = stop.at - x[*node];
-            x.iter_mut().for_each(|x| *x += shift);
-            v.iter_mut().for_each(|v| *v = stop.slowed(v, h));
+        for (node, stop) in &self.stops {
+            if gave_up {
+                v.iter_mut().for_each(|v| *v = stop.slowed(v, h));
+            } else {
+                v[*node] = stop.slowed(&v[*node], h);
+            }
+        }
+        if !self.stops.is_empty() {
+            x.copy_from_slice(&self.x);
         }
     }
 }
@@ -166,16 +142,19 @@ mod tests {
             let body = &mut bodies[handle];
             let before = body.state.x.clone();
             let mut problem = BodyProblem::new(body, 0.1, &Vec3::zeros(), &[]);
+            problem.current.x.clone_from(&body.state.x);
             problem.gave_up = true;
             let mut crossings = Crossings::default();
             crossings.begin(&[]);
-            assert!(crossings.stop(body, &problem, std::iter::once(&floor), 0.1));
+            assert_eq!(crossings.find(&mut problem, std::iter::once(&floor), 0.1), 0.0);
+            crossings.stop(body, true, 0.1);
             let moved = body.state.x[0] - before[0];
             assert!(body.state.x.iter().zip(&before).all(|(x, b)| (x - b - moved).norm() < 1e-12));
             let lowest = body.state.x.iter().map(|x| x.y).fold(f64::INFINITY, f64::min);
-            let expected = if pinned { -0.01 } else { CLEARANCE * body.model.surface.mean_edge };
-            assert!((lowest - expected).abs() < 1e-6, "{lowest}");
-            assert!(body.state.v.iter().all(|v| v.y.abs() < 1e-12));
+            let (height, speed) =
+                if pinned { (-0.01, 3.0) } else { (CLEARANCE * body.model.surface.mean_edge, 0.0) };
+            assert!((lowest - height).abs() < 1e-6, "{lowest}");
+            assert!(body.state.v.iter().all(|v| (v.y + speed).abs() < 1e-12));
         }
     }
 }

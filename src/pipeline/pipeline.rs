@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! read_obstacles → wake → predict → detect → meet → tie → close → settle_orders → prepare_factors →
-//! form_islands → solve → advance → fall_asleep → write reactions → (rapier steps) → after_step
+//! form_islands → solve → keep_out → advance → fall_asleep → write reactions → (rapier steps) → after_step
 //! ```
 
 use super::contacts::{DeformableContact, DeformablePairContact, JointForce, RigidContact};
@@ -109,6 +109,7 @@ impl DeformablePipeline {
         self.counters.factor_time = clock.lap();
         self.solve(parameters, h);
         self.counters.solve_time = clock.lap();
+        self.keep_out(parameters, h);
         self.advance(deformables, h);
         self.fall_asleep(deformables, sets, gravity, h);
         let asleep = &self.sleeping.rigid;
@@ -370,6 +371,28 @@ impl DeformablePipeline {
         }
     }
 
+    /// Finds what has come into obstacles without a contact. Bodies that stopping it would strain by more energy than
+    /// they have to spare give their step up.
+    fn keep_out(&mut self, parameters: &DeformableParameters, h: f64) {
+        let limits = parameters.contact_limits();
+        let (scene, works) = (&self.scene, &mut self.works);
+        for work in &mut self.islands {
+            let mut again = true;
+            while std::mem::take(&mut again) {
+                for (local, &index) in work.members.iter().enumerate() {
+                    let strain = works[index].find_crossings(&mut work.island.bodies[local], scene, h);
+                    if strain > 0.0 && work.island.would_gain_energy(local, strain, &scene.partners, h) {
+                        work.island.bodies[local].gave_up = true;
+                        again = true;
+                    }
+                }
+                if again {
+                    work.island.move_as_wholes(&self.factors, &scene.partners, h, &limits);
+                }
+            }
+        }
+    }
+
     fn advance(&mut self, deformables: &mut DeformableBodySet, h: f64) {
         deformables.reset_attachment_forces();
         self.reaction_list.clear();
@@ -382,8 +405,9 @@ impl DeformablePipeline {
                 if finite {
                     store(body, work, local, h, &mut self.counters);
                     let problem = &work.island.bodies[local];
-                    body.report.gave_up = self.works[index].stop_crossings(body, problem, &self.scene, h);
-                    self.counters.gave_up += usize::from(body.report.gave_up);
+                    body.report.gave_up = problem.gave_up;
+                    self.works[index].crossings.stop(body, problem.gave_up, h);
+                    self.counters.gave_up += usize::from(problem.gave_up);
                     give_forces(&work.island.bodies[local], deformables);
                 } else if !work.island.bodies[local].current.x.iter().all(is_number) {
                     quarantine(body, &mut self.counters);

@@ -36,7 +36,7 @@ pub(super) struct BodyWork {
     /// Other deformables are near, or the body may touch itself.
     pub in_company: bool,
     tree: SurfaceTree,
-    crossings: Crossings,
+    pub crossings: Crossings,
 }
 
 /// How far a body that touches nothing looks ahead \[s\].
@@ -193,18 +193,12 @@ impl BodyWork {
         self.ahead.extend(self.distances.iter().map(|(_, s)| *s));
     }
 
-    /// Stops what has come into obstacles without a contact in a step of `h` \[s\]; tells whether the body moved as a
-    /// whole.
-    pub fn stop_crossings(
-        &mut self,
-        body: &mut DeformableBody,
-        problem: &BodyProblem,
-        scene: &RapierScene,
-        h: f64,
-    ) -> bool {
+    /// Finds what has come into obstacles without a contact in a step of `h` \[s\]; returns the energy \[J\] that it
+    /// takes to stop it.
+    pub fn find_crossings(&mut self, problem: &mut BodyProblem, scene: &RapierScene, h: f64) -> f64 {
         let obstacles = self.met.iter().map(|&o| &scene.obstacles[o as usize]);
         let solid = obstacles.filter(|o| !scene.partners.yields(o.partner));
-        self.crossings.stop(body, problem, solid, h)
+        self.crossings.find(problem, solid, h)
     }
 
     /// Takes another place in the step's list.

@@ -75,6 +75,8 @@ pub(crate) struct Iterate {
     pub r: Vec<Vec3>,
     /// Ψ \[J\].
     pub objective: f64,
+    /// E, with the stiffness damping of the step \[J\].
+    pub elastic: f64,
     /// Least `tr(QᵀR)` of the elements against the body's frame.
     pub least_trace: f64,
     /// Largest internal force on a node \[N\].
@@ -196,6 +198,11 @@ impl BodyProblem {
         Elements { model: &self.model, material: &self.material, activation: self.activation }
     }
 
+    /// Mass of a node \[kg\].
+    pub fn mass(&self, node: usize) -> f64 {
+        self.masses[node]
+    }
+
     /// The step \[s\] that the matrix is of.
     pub fn h(&self) -> f64 {
         self.h
@@ -303,6 +310,7 @@ impl BodyProblem {
             at.objective = f64::INFINITY;
             return;
         }
+        at.elastic = elastic.energy;
         at.least_trace = elastic.least_trace;
         at.internal = at.r.iter().map(|f| f.amax()).fold(0.0, f64::max);
         let (inertia, drag) = (1.0 / (self.h * self.h), self.material.mass_damping / self.h);

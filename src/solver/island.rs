@@ -113,9 +113,8 @@ impl Island {
         self.bodies.iter().for_each(|b| self.report.effort.add(&b.metric.effort));
     }
 
-    /// Bodies whose step is far from solved and would gain energy keep their shape instead, and contacts are solved again
-    /// with them: where forces change wildly from iteration to iteration, what they have done to a body is
-    /// not what the last ones take from others.
+    /// Bodies whose step is far from solved and would gain energy give it up: where forces change wildly from iteration
+    /// to iteration, what they have done to a body is not what the last ones take from others.
     fn give_up_what_gains_energy(
         &mut self,
         factors: &FactorCache,
@@ -123,47 +122,66 @@ impl Island {
         h: f64,
         limits: &ContactLimits,
     ) {
-        while self.find_gains(partners, h) {
-            self.contacts.lay_changes(&mut self.bodies);
-            let own = Factors { cache: factors, tangents: &self.tangents };
-            for (index, body) in self.bodies.iter_mut().enumerate() {
-                let factor = own.of(index, body);
-                if body.gave_up {
-                    body.begin_as_a_whole(factor);
-                } else {
-                    body.trial.x.clone_from(&body.current.x);
-                    body.contact_step(factor);
+        loop {
+            let mut gains = false;
+            for index in 0..self.bodies.len() {
+                let body = &self.bodies[index];
+                let is_solved = body.residual() <= FAR_FROM_SOLVED * body.force_scale();
+                if !is_solved && self.would_gain_energy(index, 0.0, partners, h) {
+                    self.bodies[index].gave_up = true;
+                    gains = true;
                 }
             }
-            self.assembly = Assembly::Anew;
-            self.solve_contacts(factors, partners, h, limits);
-            for body in &mut self.bodies {
-                if body.gave_up {
-                    body.end_as_a_whole();
-                } else {
-                    body.evaluate_trial();
-                    body.accept_trial();
-                }
+            if !gains {
+                break;
             }
+            self.move_as_wholes(factors, partners, h, limits);
         }
     }
 
-    /// Marks bodies that would gain energy; false if there are none.
-    fn find_gains(&mut self, partners: &Partners, h: f64) -> bool {
-        let mut found = false;
+    /// Whether a body's step makes energy, with what its contacts make and `besides` \[J\]; not if it has given it up.
+    pub fn would_gain_energy(&mut self, index: usize, besides: f64, partners: &Partners, h: f64) -> bool {
+        if self.bodies[index].gave_up {
+            return false;
+        }
+        let by_contacts = self.contacts.made_energy(index, &self.bodies, partners, h);
+        self.bodies[index].gains_energy(by_contacts.max(0.0) + besides)
+    }
+
+    /// Takes the step of bodies that have given it up in their shapes, with contacts solved anew.
+    pub fn move_as_wholes(
+        &mut self,
+        factors: &FactorCache,
+        partners: &Partners,
+        h: f64,
+        limits: &ContactLimits,
+    ) {
         for index in 0..self.bodies.len() {
-            let body = &self.bodies[index];
-            if body.gave_up || body.residual() <= FAR_FROM_SOLVED * body.force_scale() {
-                continue;
-            }
-            let by_contacts = self.contacts.made_energy(index, &self.bodies, partners, h);
-            if self.bodies[index].gains_energy(by_contacts) {
-                self.bodies[index].gave_up = true;
+            if self.bodies[index].gave_up {
                 self.contacts.restart(index);
-                found = true;
             }
         }
-        found
+        self.contacts.lay_changes(&mut self.bodies);
+        let own = Factors { cache: factors, tangents: &self.tangents };
+        for (index, body) in self.bodies.iter_mut().enumerate() {
+            let factor = own.of(index, body);
+            if body.gave_up {
+                body.begin_as_a_whole(factor);
+            } else {
+                body.trial.x.clone_from(&body.current.x);
+                body.contact_step(factor);
+            }
+        }
+        self.assembly = Assembly::Anew;
+        self.solve_contacts(factors, partners, h, limits);
+        for body in &mut self.bodies {
+            if body.gave_up {
+                body.end_as_a_whole();
+            } else {
+                body.evaluate_trial();
+                body.accept_trial();
+            }
+        }
     }
 
     /// One iteration.

@@ -1,12 +1,12 @@
 //! Steps that would make energy out of nothing are given up: the body keeps its shape and moves as a rigid one, in
-//! contact with what it touches. Among rigid bodies contacts only ever take energy.
+//! contact with what it touches. Between rigid bodies contacts only ever take energy.
 
 use super::body_problem::BodyProblem;
 use super::factor_cache::SystemFactor;
 use crate::math::{Mat3, Vec3, skew, solve_semidefinite};
 
-/// Share of a body's energy by which [`BodyProblem::gains_energy`] forgives a few iterations: those of one iteration
-/// gain up to 3 % in a step and lose it in the next ones.
+/// Share of a body's energy that a step of one iteration may make: such steps gain up to 3 % and lose it in the next
+/// ones. Those of n iterations a part in n² of it.
 const MAX_GAIN: f64 = 0.1;
 
 /// As [`MAX_GAIN`], of the work that contacts do on the body.
@@ -63,22 +63,49 @@ impl RigidMode {
 }
 
 impl BodyProblem {
-    /// Whether the step would make energy out of nothing: for forces λ of the contacts, implicit Euler ends with
-    /// `Ψ(x) − λᵀJx` no higher than where it began [cf. Hairer et al. 2006], and what they give to the body
-    /// their other sides lose, but for what contacts make themselves, `by_contacts` \[J\], by drawing overlaps apart.
-    pub fn gains_energy(&mut self, by_contacts: f64) -> bool {
-        let by_contact: f64 = (self.current.x.iter().zip(&self.x_start).zip(&self.contact_force))
-            .map(|((x, start), f)| (x - start).dot(f))
-            .sum();
+    /// Whether the step makes energy out of nothing: more elastic and kinetic energy than the forces on the body have put
+    /// into it, and `besides` \[J\] that others have gained. An implicit Euler step of a convex energy only ever
+    /// takes some [cf. Hairer et al. 2006].
+    pub fn gains_energy(&mut self, besides: f64) -> bool {
         let mut still = std::mem::take(&mut self.trial);
         still.x.clone_from(&self.x_start);
-        self.key.pins.iter().for_each(|&p| still.x[p as usize] = self.target[p as usize]);
         self.evaluate(&mut still, f64::INFINITY);
-        let gained = self.current.objective - by_contact - still.objective + by_contacts.max(0.0);
-        let allowed = MAX_GAIN * still.objective + MAX_GAIN_OF_WORK * by_contact.abs();
+        let before = still.elastic;
         self.trial = still;
+        let (mut kinetic, mut gained, mut by_contact) = (0.0, self.current.elastic - before, 0.0);
+        let mut pins = self.key.pins.iter().peekable();
+        for (i, m) in self.masses.iter().enumerate() {
+            let moved = self.current.x[i] - self.x_start[i];
+            if pins.next_if(|&&p| p as usize == i).is_some() {
+                // The force of the pin.
+                gained += self.current.r[i].dot(&moved);
+                continue;
+            }
+            let v = self.v_start[i];
+            let external = ((self.target[i] - self.x_start[i]) / self.h - v) * (*m / self.h);
+            let contact = self.contact_force[i].dot(&moved);
+            kinetic += 0.5 * m * v.norm_squared();
+            gained += 0.5 * m * (moved.norm_squared() / (self.h * self.h) - v.norm_squared());
+            gained -= external.dot(&moved) + contact;
+            by_contact += contact;
+        }
+        let iterations = self.settings.max_iterations.max(1) as f64;
+        let share = MAX_GAIN / (iterations * iterations);
+        let allowed = share * (before + kinetic) + MAX_GAIN_OF_WORK * by_contact.abs();
         // Written so that what is not a number counts as gained.
-        !(gained <= allowed)
+        !(gained + besides <= allowed)
+    }
+
+    /// Energy \[J\] that it takes to put nodes elsewhere at the end of the step: what the body has then at `x`, and there
+    /// is lost of its motion.
+    pub fn strain_energy(&mut self, x: &[Vec3], lost: f64) -> f64 {
+        let mut there = std::mem::take(&mut self.trial);
+        there.x.clear();
+        there.x.extend_from_slice(x);
+        self.evaluate(&mut there, f64::INFINITY);
+        let gained = there.elastic - self.current.elastic - lost;
+        self.trial = there;
+        gained
     }
 
     /// Gives the step up: sets the trial to where the body goes in its shape under the present contact forces, from
@@ -109,13 +136,5 @@ impl BodyProblem {
             self.accept_trial();
         }
         self.evaluate_current();
-    }
-    /// How far the body goes as a whole if nothing touches it \[m\]; not at all if it is pinned.
-    pub fn mean_shift(&self) -> Vec3 {
-        if !self.key.pins.is_empty() {
-            return Vec3::zeros();
-        }
-        let moved = self.target.iter().zip(&self.x_start).zip(&self.masses);
-        moved.map(|((to, from), m)| (to - from) * *m).sum::<Vec3>() / self.masses.iter().sum::<f64>()
     }
 }
