@@ -1,7 +1,7 @@
 //! Contacts of one body with one obstacle.
 
 use super::obstacle::Obstacle;
-use super::rim_rows::{corner_on_triangle, corners_in, rim_crossing};
+use super::rim_rows::{corner_on_triangle, corners_in, edge_crossing, rim_crossing};
 use super::row::{Law, Row, Side};
 use super::surface_point::{Scales, SurfacePoint, surface_point};
 use super::thin::{looks_away, segment_point, side_of_node};
@@ -177,34 +177,33 @@ impl Detector {
         for (e, edge) in surface.edges.iter().enumerate() {
             let ends = edge.map(|n| surface.index_of_node[n as usize] as usize);
             let reach = self.reach[ends[0]].max(self.reach[ends[1]]) + scene.motion;
-            let mut best = None;
-            for [inner, outer] in [[0, 1], [1, 0]] {
-                let (Some(on_face), other) = (self.nodes[ends[inner]], self.nodes[ends[outer]]) else {
-                    continue;
-                };
+            let points = ends.map(|s| self.local[s]);
+            let crossing = |inner: usize| {
+                let (on_face, other) = (self.nodes[ends[inner]]?, self.nodes[ends[1 - inner]]);
                 let same_face = |o: SurfacePoint| o.flat && o.normal == on_face.normal;
                 if !on_face.flat || on_face.gap > reach || other.is_some_and(same_face) {
-                    continue;
+                    return None;
                 }
-                let [a, b] = [self.local[ends[inner]], self.local[ends[outer]]];
                 let mut outward = self.edge_normal(surface, e);
                 if surface.is_thin_edge(e) {
                     outward = -on_face.normal;
                 }
-                let crossing = rim_crossing(scene.obstacle, &on_face, &a, &b, &outward, &scene.scales);
-                let deeper =
-                    |f: &SurfacePoint| best.as_ref().is_none_or(|(_, b): &(Row, SurfacePoint)| f.gap < b.gap);
-                if let Some((t, found)) = crossing.filter(|(_, f)| f.gap < reach && deeper(f)) {
-                    let nodes = [edge[inner], edge[outer], 0];
-                    let row = scene.row(nodes, [1.0 - t, t, 0.0], &found, scene.edge_feature(e));
-                    best = Some((row, found));
+                let [a, b] = [&points[inner], &points[1 - inner]];
+                let (t, found) = rim_crossing(scene.obstacle, &on_face, a, b, &outward, &scene.scales)?;
+                Some((if inner == 0 { t } else { 1.0 - t }, found))
+            };
+            let found = match (crossing(0), crossing(1)) {
+                (Some(first), Some(second)) => {
+                    let deeper = if second.1.gap < first.1.gap { second } else { first };
+                    let over = edge_crossing([&first.1, &second.1], points.each_ref(), &scene.scales);
+                    Some(over.unwrap_or(deeper))
                 }
-            }
-            // Draped over an edge of the obstacle, one edge of the body crosses two rims in one place:
-            // the deeper one stands for both.
-            if let Some((row, found)) = best {
+                (first, second) => first.or(second),
+            };
+            if let Some((t, found)) = found.filter(|(_, found)| found.gap < reach) {
+                let nodes = [edge[0], edge[1], 0];
+                rows.push(scene.row(nodes, [1.0 - t, t, 0.0], &found, scene.edge_feature(e)));
                 self.edges[e] = Some(found);
-                rows.push(row);
             }
         }
     }

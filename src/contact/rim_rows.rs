@@ -19,6 +19,8 @@ const FACING: f64 = -0.1;
 const LEADS_OUT: f64 = 0.5;
 /// Halvings of an edge: to 6e-8 of its length, the resolution of `f32`.
 const HALVINGS: usize = 24;
+/// Sine below which two directions count as parallel.
+const PARALLEL: f64 = 1.0e-3;
 /// Nearer to the node than this part of the edge the node's own row serves.
 const AT_NODE: f64 = 1.0e-3;
 
@@ -54,6 +56,33 @@ pub(crate) fn rim_crossing(
     let gap = on_face.normal.dot(&(p - on_face.point));
     let row = SurfacePoint { point: p - on_face.normal * gap, gap, ..*on_face };
     (over > AT_NODE && gap > -2.0 * scales.shift).then_some((over, row))
+}
+
+/// The point of the body edge between `ends` where it lies over the edge of the obstacle that two of its plane faces
+/// share, and its row: across both edges. `on_rims` are the rows of its [`rim_crossing`]s with the two faces: either alone
+/// would let it slip around the other's. `None` if these are not one place of a convex edge.
+pub(crate) fn edge_crossing(
+    on_rims: [&SurfacePoint; 2],
+    ends: [&Vec3; 2],
+    scales: &Scales,
+) -> Option<(f64, SurfacePoint)> {
+    let [first, second] = on_rims;
+    let along = first.normal.cross(&second.normal).try_normalize(PARALLEL)?;
+    let across = |v: Vec3| v - along * along.dot(&v);
+    if across(second.point - first.point).norm() > scales.band {
+        return None;
+    }
+    let edge = ends[1] - ends[0];
+    let normal = edge.cross(&along).try_normalize(PARALLEL * edge.norm())?;
+    let normal = if normal.dot(&(first.normal + second.normal)) < 0.0 { -normal } else { normal };
+    if normal.dot(&first.normal) < 0.0 || normal.dot(&second.normal) < 0.0 {
+        return None;
+    }
+    let flat = across(edge);
+    let t = (flat.dot(&(first.point - ends[0])) / flat.norm_squared()).clamp(0.0, 1.0);
+    let p = ends[0] + edge * t;
+    let gap = normal.dot(&(p - first.point));
+    Some((t, SurfacePoint { point: p - normal * gap, normal, gap, flat: false }))
 }
 
 /// Corners of an obstacle in its own frame, within `region`, each with a number of its own.
@@ -117,6 +146,7 @@ fn leads_out(obstacle: &Obstacle, corner: &Vec3, normal: &Vec3, scales: &Scales)
 mod tests {
     use super::*;
     use crate::contact::PartnerId;
+    use crate::contact::surface_point::surface_point;
     use crate::math::{Mat3, Pose64};
     use parry3d::shape::SharedShape;
     use proptest::prelude::*;
@@ -129,6 +159,34 @@ mod tests {
     }
 
     proptest! {
+        /// A body edge lies over an edge of a box, sloping by any angle: its row is across both, at their distance,
+        /// whichever of its ends comes first.
+        #[test]
+        fn edges_over_edges_push_across_both(angle in 0.1..1.4f64, along in -2.0..2.0f64, gap in -2e-3..2e-3f64, place in 0.3..0.7f64) {
+            let cuboid = obstacle(SharedShape::cuboid(0.5, 0.4, 0.5));
+            let normal = Vec3::new(angle.sin(), angle.cos(), 0.0);
+            let direction = Vec3::new(angle.cos(), -angle.sin(), along).normalize();
+            let normal = (normal - direction * direction.dot(&normal)).normalize();
+            let middle = Vec3::new(0.5, 0.4, 0.1) + normal * gap;
+            let ends = [middle - direction * (0.1 * place), middle + direction * (0.1 * (1.0 - place))];
+            let outward = -normal;
+            let crossing = |inner: usize| {
+                let face = [Vec3::y(), Vec3::x()][inner];
+                let on_face = surface_point(&cuboid, &(ends[inner] + face * 0.01), &outward, &SCALES).unwrap();
+                assert!(on_face.flat && (on_face.normal - face).norm() < 1e-6);
+                let (t, row) = rim_crossing(&cuboid, &on_face, &ends[inner], &ends[1 - inner], &outward, &SCALES)?;
+                Some((if inner == 0 { t } else { 1.0 - t }, row))
+            };
+            // Ends beside a face have crossings with both.
+            prop_assume!(ends[1].y < 0.399 && ends[0].x < 0.499);
+            let (Some((_, top)), Some((_, side))) = (crossing(0), crossing(1)) else { return Err(TestCaseError::reject("none")) };
+            for (rows, ends, place) in [([&top, &side], [&ends[0], &ends[1]], place), ([&side, &top], [&ends[1], &ends[0]], 1.0 - place)] {
+                let (t, row) = edge_crossing(rows, ends, &SCALES).unwrap();
+                prop_assert!((row.normal - normal).norm() < 1e-6, "{}", row.normal);
+                prop_assert!((row.gap - gap).abs() < 1e-6 && (t - place).abs() < 1e-5, "{} {}", row.gap, t);
+            }
+        }
+
         /// A box stands, a little tilted, on a film thinner than what tells inside from outside: on its upper side
         /// only.
         #[test]

@@ -7,7 +7,7 @@ use crate::math::{Mat3, Vec3, skew, solve_semidefinite};
 
 /// Share of a body's energy that a step of one iteration may make: such steps gain up to 3 % and lose it in the next
 /// ones. Those of n iterations a part in n² of it.
-const MAX_GAIN: f64 = 0.1;
+const MAX_GAIN: f64 = 0.04;
 
 /// As [`MAX_GAIN`], of the work that contacts do on the body.
 const MAX_GAIN_OF_WORK: f64 = 1.0e-3;
@@ -90,7 +90,7 @@ impl BodyProblem {
             by_contact += contact;
         }
         let iterations = self.settings.max_iterations.max(1) as f64;
-        let share = MAX_GAIN / (iterations * iterations);
+        let share = MAX_GAIN / iterations;
         let allowed = share * (before + kinetic) + MAX_GAIN_OF_WORK * by_contact.abs();
         // Written so that what is not a number counts as gained.
         !(gained + besides <= allowed)
