@@ -105,7 +105,7 @@ fn no_corner_makes_energy_or_goes_through_the_floor() {
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for (c, f) in corners.iter().zip(&thrown) {
-        if f.growth > 2e-3 || f.excess > 1e-6 || f.lowest < 0.0 {
+        if f.growth > 2e-3 || f.excess > 1e-6 || f.lowest < 0.0 || f.gave_up > 0 {
             println!(
                 "| {:.0e} | {} | {:.4} | {:.0e} | {} | {} | {:.1e} | {:.1e} | {:.3} | {:.3} | {} |",
                 c.e,
@@ -125,17 +125,13 @@ fn no_corner_makes_energy_or_goes_through_the_floor() {
     println!("{} corners", corners.len());
     for (c, f) in corners.iter().zip(&thrown) {
         assert!(f.finite, "{c:?}: {f:?}");
-        // A crushed cube is a film on the floor: nodes without contact stop there, those with one as far below as the
-        // iterations leave them. The box then lies on the floor by rapier's contacts.
-        let depth = if c.iterations == 1 { -0.1 } else { -0.01 };
+        // A crushed cube is a film on the floor, as far below as one iteration leaves the nodes, and the box lies on it.
+        let depth = if c.iterations == 1 { -0.02 } else { 0.0 };
         assert!(f.lowest > depth && f.lowest_box > 0.4, "{c:?}: {f:?}");
         assert!(f.excess < 1e-6, "{c:?}: {f:?}");
         // What a body of this stiffness can carry, in steps of a game.
         let carries = c.e >= 1e6 && c.dt < 0.02 && c.speed == 0.0;
         assert!(!carries || f.lowest > 0.0 && f.gave_up == 0, "{c:?}: {f:?}");
-        // Beyond that a crushed cube, pinched between box and floor, comes back in jumps; rapier's box alone on the
-        // floor gains up to 0.02 at 1/10 s.
-        let growth = if carries { 2e-3 } else { 0.1 };
-        assert!(c.iterations == 1 || f.growth < growth, "{c:?}: {f:?}");
+        assert!(c.iterations == 1 || f.growth < 2e-3, "{c:?}: {f:?}");
     }
 }

@@ -3,6 +3,7 @@
 //! Architecture invariant: the only room that names parry's queries, and it knows no rapier sets:
 //! `coupling` fills the [`Obstacle`]s.
 
+mod approach;
 mod between;
 mod candidates;
 pub(crate) mod cone;
@@ -19,6 +20,7 @@ mod tangle;
 mod thin;
 mod triangle_rows;
 
+pub(crate) use approach::{MeetingPoint, meeting_points};
 pub(crate) use between::{BetweenDetector, SoftPair, SoftSurface};
 pub(crate) use candidates::Candidates;
 pub(crate) use detection::{Detector, Pair, STATIC_MARGIN};

@@ -36,6 +36,16 @@ impl Obstacle {
         self.end.transform(&self.start.inverse_transform(p)) - p
     }
 
+    /// Displacement over the step \[m\] of the corner of the obstacle's box that goes farthest.
+    pub fn largest_displacement(&self) -> f64 {
+        if self.start == self.end || self.shape.as_halfspace().is_some() {
+            return 0.0;
+        }
+        let corners = self.shape.compute_local_aabb().vertices().map(|v| crate::math::from_real(v));
+        let moved = corners.map(|v| (self.end.transform(&v) - self.start.transform(&v)).norm());
+        moved.into_iter().fold(0.0, f64::max)
+    }
+
     /// Box around all of the step.
     pub fn swept_aabb(&self) -> Aabb {
         let local = self.shape.compute_local_aabb();

@@ -9,8 +9,8 @@ use super::joint_rows::{JointEnds, drive_rows, joint_rows};
 use super::obstacles::RapierScene;
 use super::parts::{RapierSets, packed, unpacked};
 use crate::body::{ContactKey, FIRST_LINK_SLOT};
-use crate::contact::{Law, PartnerId, Row, Side};
-use crate::math::{Pose64, from_real};
+use crate::contact::{Candidates, Law, MeetingPoint, PartnerId, Row, Side};
+use crate::math::{Pose64, Vec3, from_real};
 use crate::solver::Partner;
 use rapier3d::dynamics::{ImpulseJointHandle, MultibodyIndex, RigidBodyHandle};
 use rapier3d::geometry::{ColliderHandle, ContactManifold, ContactPair, SolverFlags};
@@ -27,15 +27,19 @@ pub(crate) struct Closure {
     pub driven_links: Vec<(MultibodyIndex, usize)>,
     articulations: HashSet<usize>,
     /// Pairs of colliders by what the keys of their rows hold, ascending.
-    pairs: Vec<((u64, u32), (ColliderHandle, ColliderHandle))>,
+    pub(super) pairs: Vec<((u64, u32), (ColliderHandle, ColliderHandle))>,
     queue: Vec<RigidBodyHandle>,
     reached: HashSet<RigidBodyHandle>,
-    done: HashSet<RigidBodyHandle>,
+    pub(super) done: HashSet<RigidBodyHandle>,
+    /// Obstacles near one.
+    pub(super) near: Vec<u32>,
+    pub(super) meeting: Vec<MeetingPoint>,
 }
 
 /// Where a walk takes place, and how many bodies it goes through at the most.
 pub(crate) struct Around<'a> {
     pub scene: &'a mut RapierScene,
+    pub candidates: &'a Candidates,
     pub sets: RapierSets<'a>,
     pub gravity: Vector,
     /// \[s\].
@@ -57,6 +61,9 @@ const CONTACT_SLOT: u32 = FIRST_LINK_SLOT;
 const JOINT_SLOT: u32 = FIRST_LINK_SLOT + 1;
 /// As [`CONTACT_SLOT`], of the joints of multibodies.
 const LINK_SLOT: u32 = FIRST_LINK_SLOT + 2;
+/// Share of a gap that may close in a step. What goes all the way rapier stops by itself in its last substep, of which
+/// there are four by default, unevenly, and the impulses of that would push in the next step too.
+const LANDING: f64 = 0.75;
 /// Points of a manifold that keys tell apart.
 const POINTS: u32 = 1 << 16;
 
@@ -83,6 +90,7 @@ impl Closure {
         while let Some(&handle) = self.queue.get(next) {
             next += 1;
             self.take_contacts(handle, around);
+            self.take_approaches(handle, around);
             self.take_joints(handle, around);
             self.take_articulation(handle, around);
             self.done.insert(handle);
@@ -107,7 +115,7 @@ impl Closure {
         }
     }
 
-    fn reach(&mut self, around: &Around<'_>, partner: PartnerId) {
+    pub(super) fn reach(&mut self, around: &Around<'_>, partner: PartnerId) {
         let Around { scene, limit, .. } = around;
         let Some(handle) = scene.handles[partner.0 as usize] else { return };
         if scene.partners.yields(partner) && self.queue.len() < *limit && self.reached.insert(handle) {
@@ -128,8 +136,8 @@ impl Closure {
                 let sides = [pair.collider1, pair.collider2]
                     .map(|c| around.collider_partner(c).zip(collider_pose(sets, c)));
                 let [Some((first, pose1)), Some((second, pose2))] = sides else { continue };
-                let key = (packed(pair.collider1.into_raw_parts()), pair.collider2.into_raw_parts().0);
-                self.pairs.push((key, (pair.collider1, pair.collider2)));
+                let key = contact_key([pair.collider1, pair.collider2]);
+                self.pairs.push(((key.obstacle, key.part), (pair.collider1, pair.collider2)));
                 contact_rows(pair, [first, second], [&pose1, &pose2], sets, &mut self.rows);
                 self.reach(around, first);
                 self.reach(around, second);
@@ -211,8 +219,30 @@ fn collider_pose(sets: RapierSets<'_>, handle: ColliderHandle) -> Option<Pose64>
     Some(offset.map_or(start, |offset| start.compose(&offset)))
 }
 
-/// The points of a pair that rapier solves for, at the present poses. Overlaps count as touching: they
-/// are rapier's to recover.
+/// The key that the rows of two colliders' contact begin with.
+pub(super) fn contact_key(colliders: [ColliderHandle; 2]) -> ContactKey {
+    let [first, second] = colliders.map(ColliderHandle::into_raw_parts);
+    ContactKey { obstacle: packed(first), part: second.0, feature: 0, slot: CONTACT_SLOT }
+}
+
+/// The row between points of two partners, with a unit normal out of the first, friction and restitution. Overlaps
+/// count as touching: they are rapier's to recover.
+pub(super) fn contact_row(
+    partners: [PartnerId; 2],
+    points: [Vec3; 2],
+    normal: &Vec3,
+    gap: f64,
+    [friction, restitution]: [f64; 2],
+    key: ContactKey,
+) -> Row {
+    let sides = [1, 0].map(|k| Side::Partner { partner: partners[k], point: points[k] });
+    let mut row = Row::new(sides, *normal, LANDING * gap.max(0.0), key);
+    row.law = Law::Contact { friction: friction.clamp(0.0, 1e4) };
+    row.restitution = restitution.clamp(0.0, 1.0);
+    row
+}
+
+/// The points of a pair that rapier solves for, at the present poses.
 fn contact_rows(
     pair: &ContactPair,
     partners: [PartnerId; 2],
@@ -235,21 +265,11 @@ fn contact_rows(
         for (k, point) in (0u32..).zip(&manifold.points) {
             let p1 = pose1.transform(&from_real(point.local_p1));
             let p2 = pose2.transform(&from_real(point.local_p2));
-            let key = ContactKey {
-                obstacle: packed(pair.collider1.into_raw_parts()),
-                part: pair.collider2.into_raw_parts().0,
-                feature: (m % POINTS) * POINTS + k % POINTS,
-                slot: CONTACT_SLOT,
-            };
-            let sides = [
-                Side::Partner { partner: partners[1], point: p2 },
-                Side::Partner { partner: partners[0], point: p1 },
-            ];
-            let gap = ((p2 - p1).dot(&normal) - skins).max(0.0);
-            let mut row = Row::new(sides, normal, gap, key);
-            row.law = Law::Contact { friction: f64::from(manifold.data.friction).clamp(0.0, 1e4) };
-            row.restitution = f64::from(manifold.data.restitution).clamp(0.0, 1.0);
-            rows.push(row);
+            let mut key = contact_key([pair.collider1, pair.collider2]);
+            key.feature = (m % POINTS) * POINTS + k % POINTS;
+            let gap = (p2 - p1).dot(&normal) - skins;
+            let coefficients = [manifold.data.friction, manifold.data.restitution].map(f64::from);
+            rows.push(contact_row(partners, [p1, p2], &normal, gap, coefficients, key));
         }
     }
 }

@@ -3,6 +3,7 @@
 //! Architecture invariant: the only room that reads and writes rapier's sets; `pipeline` passes them on.
 //! Everything below works on obstacles, partners and rows.
 
+mod approach;
 mod articulations;
 mod closure;
 mod joint_rows;

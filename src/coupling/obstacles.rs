@@ -13,6 +13,7 @@ use rapier3d::dynamics::{
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet, InteractionGroups};
 use rapier3d::math::{Pose, Vector};
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// The rigid world of one step.
@@ -70,6 +71,14 @@ impl RapierScene {
         }
         let seen = &self.seen;
         self.meshes.retain(|address, _| seen.contains(address));
+    }
+
+    /// The obstacles of a collider: ascending by slot, as rapier goes through its set.
+    pub fn obstacles_of(&self, collider: ColliderHandle) -> Range<usize> {
+        let slot = |c: &ColliderHandle| c.into_raw_parts().0;
+        let first = self.colliders.partition_point(|c| slot(c) < slot(&collider));
+        let count = self.colliders[first..].iter().take_while(|c| **c == collider).count();
+        first..first + count
     }
 
     /// The collider that an obstacle's key names.

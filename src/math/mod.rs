@@ -93,6 +93,15 @@ impl Pose64 {
         self.rotation.tr_mul(&(p - self.translation))
     }
 
+    /// Another pose as seen from this one, as parry takes it.
+    pub fn relative(&self, other: &Self) -> rapier3d::math::Pose {
+        let rotation = nalgebra::Rotation3::from_matrix_unchecked(self.rotation.tr_mul(&other.rotation));
+        let q = nalgebra::UnitQuaternion::from_rotation_matrix(&rotation);
+        let [x, y, z, w] = [q.i, q.j, q.k, q.w].map(|c| c as f32);
+        let translation = to_real(&self.inverse_transform(&other.translation));
+        rapier3d::math::Pose::from_parts(translation, rapier3d::math::Rotation::from_xyzw(x, y, z, w))
+    }
+
     /// `self ∘ other`.
     pub fn compose(&self, other: &Self) -> Self {
         Self { rotation: self.rotation * other.rotation, translation: self.transform(&other.translation) }

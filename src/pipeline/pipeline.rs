@@ -345,7 +345,8 @@ impl DeformablePipeline {
         let rows = self.works.iter().flat_map(|work| &work.rows).chain(&self.ties);
         let sides = rows.flat_map(|row| &row.sides);
         let touched = sides.filter_map(|side| side.partner());
-        let mut around = Around { scene: &mut self.scene, sets, gravity, dt: h, limit };
+        let (scene, candidates) = (&mut self.scene, &self.candidates);
+        let mut around = Around { scene, candidates, sets, gravity, dt: h, limit };
         self.closure.walk(&mut around, touched);
         self.counters.closure_rows = self.closure.rows.len();
     }
