@@ -195,7 +195,7 @@ impl Detector {
             let found = match (crossing(0), crossing(1)) {
                 (Some(first), Some(second)) => {
                     let deeper = if second.1.gap < first.1.gap { second } else { first };
-                    let over = edge_crossing([&first.1, &second.1], points.each_ref(), &scene.scales);
+                    let over = edge_crossing([&first, &second], points.each_ref(), &scene.scales);
                     Some(over.unwrap_or(deeper))
                 }
                 (first, second) => first.or(second),
