@@ -1,7 +1,7 @@
 //! Contacts of one body with one obstacle.
 
 use super::obstacle::Obstacle;
-use super::rim_rows::{corner_on_triangle, corners_in, edge_crossing, rim_crossing};
+use super::rim_rows::{corner_on_triangle, corners_in, rim_crossing};
 use super::row::{Law, Row, Side};
 use super::surface_point::{Scales, SurfacePoint, surface_point};
 use super::thin::{looks_away, segment_point, side_of_node};
@@ -192,14 +192,10 @@ impl Detector {
                 let (t, found) = rim_crossing(scene.obstacle, &on_face, a, b, &outward, &scene.scales)?;
                 Some((if inner == 0 { t } else { 1.0 - t }, found))
             };
-            let found = match (crossing(0), crossing(1)) {
-                (Some(first), Some(second)) => {
-                    let deeper = if second.1.gap < first.1.gap { second } else { first };
-                    let over = edge_crossing([&first, &second], points.each_ref(), &scene.scales);
-                    Some(over.unwrap_or(deeper))
-                }
-                (first, second) => first.or(second),
-            };
+            // Draped over an edge of the obstacle, one edge of the body crosses two rims in one place:
+            // the deeper one stands for both.
+            let crossings = [crossing(0), crossing(1)].into_iter().flatten();
+            let found = crossings.min_by(|a, b| a.1.gap.total_cmp(&b.1.gap));
             if let Some((t, found)) = found.filter(|(_, found)| found.gap < reach) {
                 let nodes = [edge[0], edge[1], 0];
                 rows.push(scene.row(nodes, [1.0 - t, t, 0.0], &found, scene.edge_feature(e)));
