@@ -2,6 +2,7 @@
 mod common;
 use common::*;
 use foible3d::prelude::*;
+use rapier3d::prelude::*;
 
 /// Steps a cube onto the floor and checks that it lies still, carries its weight and is not in the
 /// floor.
@@ -96,4 +97,25 @@ fn cube_lies_still_at_1000_steps_a_second() {
 #[test]
 fn cube_lies_still_at_1000_steps_a_second_and_ten_iterations() {
     lies_still_at_small_steps(1e-3, &[10]);
+}
+
+/// Slabs that droop over the edges of a box, turned about it or not.
+#[test]
+fn slabs_over_the_edges_of_a_box_lie_still() {
+    for (half, turn, offset) in [(0.1, 0.0, 0.0), (0.1, 0.3, 0.0), (0.15, 0.1, 0.03)] {
+        let (mut physics, _) = world_with_floor(1.0 / 60.0);
+        let support = RigidBodyBuilder::fixed().translation(Vector::Y * 0.5).rotation(Vector::Y * turn);
+        physics.insert(support, ColliderBuilder::cuboid(half, 0.1, half).friction(0.8));
+        let mut world = DeformableWorld::new();
+        let slab = DeformableBodyBuilder::cuboid(Vector::new(0.4, 0.03, 0.2), [10, 1, 5]);
+        let slab = slab.material(DeformableMaterial::new(1e5, 0.3).friction(0.8).mass_damping(1.0));
+        let slab = world.insert(slab.can_sleep(false).translation(Vector::new(offset, 0.635, 0.0))).unwrap();
+        let mut fastest = 0.0f64;
+        for step in 0..600 {
+            world.step(&mut physics);
+            fastest = if step < 480 { 0.0 } else { fastest.max(world.bodies[slab].max_speed()) };
+        }
+        println!("box of {half} m, turned by {turn}, {offset} m off: {fastest:.1e} m/s");
+        assert!(fastest < 1e-4, "box of {half} m, turned by {turn}, {offset} m off: {fastest:e} m/s");
+    }
 }

@@ -29,8 +29,8 @@ impl DeformableBody {
         self.report.residual <= self.report.tolerance
     }
 
-    /// Whether the last step was given up: the body found only steps that would have made energy, as where it is pinched
-    /// to a film, or to strain by what it ran into, and went on as a whole with its mean velocity.
+    /// Whether the last step was given up: what was found of it would have made energy, as where a body is pinched to a
+    /// film, or strained it by what it ran into. The body has kept its shape and moved as a rigid one.
     pub fn last_gave_up(&self) -> bool {
         self.report.gave_up
     }

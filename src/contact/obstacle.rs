@@ -41,7 +41,7 @@ impl Obstacle {
         if self.start == self.end || self.shape.as_halfspace().is_some() {
             return 0.0;
         }
-        let corners = self.shape.compute_local_aabb().vertices().map(|v| crate::math::from_real(v));
+        let corners = self.shape.compute_local_aabb().vertices().map(crate::math::from_real);
         let moved = corners.map(|v| (self.end.transform(&v) - self.start.transform(&v)).norm());
         moved.into_iter().fold(0.0, f64::max)
     }

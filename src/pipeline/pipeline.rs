@@ -7,17 +7,13 @@
 
 use super::contacts::{DeformableContact, DeformablePairContact, JointForce, RigidContact};
 use super::encounters::Encounters;
-use super::ending::{give_forces, quarantine, store};
+use super::ending::quarantine;
 use super::grouping::Grouping;
 use super::parameters::{DeformableCounters, DeformableParameters};
-use super::readout::{add_attachment_forces, list_closure, list_contacts, list_pair_contacts};
 use super::sleeping::Sleeping;
 use super::threads::for_each;
 use super::work::{BodyWork, IslandWork};
-use crate::body::{
-    DeformableAttachment, DeformableBody, DeformableBodyHandle, DeformableBodySet, Hold, Integrator,
-    is_number,
-};
+use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Hold, Integrator};
 use crate::contact::{Candidates, Row, Side};
 use crate::coupling::{
     Around, Closure, PhysicsParts, RapierScene, RapierSets, Reactions, held_nodes, tie_rows,
@@ -36,28 +32,28 @@ use std::time::{Duration, Instant};
 /// all with the same `dt`.
 #[derive(Default)]
 pub struct DeformablePipeline {
-    scene: RapierScene,
-    candidates: Candidates,
-    idle: HashMap<DeformableBodyHandle, BodyWork>,
-    works: Vec<BodyWork>,
-    factors: FactorCache,
-    islands: Vec<IslandWork>,
-    grouping: Grouping,
-    closure: Closure,
-    sleeping: Sleeping,
-    slept: Vec<DeformableBodyHandle>,
-    encounters: Encounters,
+    pub(super) scene: RapierScene,
+    pub(super) candidates: Candidates,
+    pub(super) idle: HashMap<DeformableBodyHandle, BodyWork>,
+    pub(super) works: Vec<BodyWork>,
+    pub(super) factors: FactorCache,
+    pub(super) islands: Vec<IslandWork>,
+    pub(super) grouping: Grouping,
+    pub(super) closure: Closure,
+    pub(super) sleeping: Sleeping,
+    pub(super) slept: Vec<DeformableBodyHandle>,
+    pub(super) encounters: Encounters,
     /// Nodes that attachments hold.
-    held: Vec<(DeformableBodyHandle, Hold)>,
+    pub(super) held: Vec<(DeformableBodyHandle, Hold)>,
     /// Rows of attachments and of contacts between deformables.
-    ties: Vec<Row>,
-    reaction_list: Vec<Reaction>,
-    reactions: Reactions,
-    contacts: Vec<DeformableContact>,
-    pair_contacts: Vec<DeformablePairContact>,
-    rigid_contacts: Vec<RigidContact>,
-    joint_forces: Vec<JointForce>,
-    counters: DeformableCounters,
+    pub(super) ties: Vec<Row>,
+    pub(super) reaction_list: Vec<Reaction>,
+    pub(super) reactions: Reactions,
+    pub(super) contacts: Vec<DeformableContact>,
+    pub(super) pair_contacts: Vec<DeformablePairContact>,
+    pub(super) rigid_contacts: Vec<RigidContact>,
+    pub(super) joint_forces: Vec<JointForce>,
+    pub(super) counters: DeformableCounters,
 }
 
 impl DeformablePipeline {
@@ -369,92 +365,6 @@ impl DeformablePipeline {
         for_each(&mut self.islands, |work| work.island.solve(factors, partners, h, &limits));
         for report in self.islands.iter().map(|work| work.island.report) {
             self.counters.add(&report);
-        }
-    }
-
-    /// Finds what has come into obstacles without a contact. Bodies that stopping it would strain by more energy than
-    /// they have to spare give their step up.
-    fn keep_out(&mut self, parameters: &DeformableParameters, h: f64) {
-        let limits = parameters.contact_limits();
-        let (scene, works) = (&self.scene, &mut self.works);
-        for work in &mut self.islands {
-            let mut again = true;
-            while std::mem::take(&mut again) {
-                for (local, &index) in work.members.iter().enumerate() {
-                    let strain = works[index].find_crossings(&mut work.island.bodies[local], scene, h);
-                    if strain > 0.0 && work.island.would_gain_energy(local, strain, &scene.partners, h) {
-                        work.island.bodies[local].gave_up = true;
-                        again = true;
-                    }
-                }
-                if again {
-                    work.island.move_as_wholes(&self.factors, &scene.partners, h, &limits);
-                }
-            }
-        }
-    }
-
-    fn advance(&mut self, deformables: &mut DeformableBodySet, h: f64) {
-        deformables.reset_attachment_forces();
-        self.reaction_list.clear();
-        self.reaction_list.resize(self.scene.partners.list.len(), Reaction::default());
-        for work in &mut self.islands {
-            let finite = work.is_finite();
-            for (local, &index) in work.members.iter().enumerate() {
-                let handle = self.works[index].handle;
-                let Some(body) = deformables.get_mut(handle) else { continue };
-                if finite {
-                    store(body, work, local, h, &mut self.counters);
-                    let problem = &work.island.bodies[local];
-                    body.report.gave_up = problem.gave_up;
-                    self.works[index].crossings.stop(body, problem.gave_up, h);
-                    self.counters.gave_up += usize::from(problem.gave_up);
-                    give_forces(&work.island.bodies[local], deformables);
-                } else if !work.island.bodies[local].current.x.iter().all(is_number) {
-                    quarantine(body, &mut self.counters);
-                }
-            }
-            if finite {
-                let contacts = &work.island.contacts;
-                contacts.add_reactions(&self.scene.partners, h, &mut self.reaction_list);
-                let handle_of = |local: usize| self.works[work.members[local]].handle;
-                list_contacts(work, &self.scene, handle_of, &mut self.contacts);
-                list_pair_contacts(work, handle_of, &mut self.pair_contacts);
-                add_attachment_forces(work, deformables);
-                list_closure(work, &self.closure, &mut self.rigid_contacts, &mut self.joint_forces);
-            }
-            for (problem, &index) in work.island.bodies.drain(..).zip(&work.members) {
-                self.works[index].problem = Some(problem);
-            }
-        }
-        deformables.attachments_mut().for_each(DeformableAttachment::end_step);
-        let forces = self.contacts.iter().map(|c| c.force).chain(self.pair_contacts.iter().map(|c| c.force));
-        self.counters.active_contacts = forces.filter(|force| *force != Vector::ZERO).count();
-        self.idle.extend(self.works.drain(..).map(|work| (work.handle, work)));
-    }
-}
-
-impl DeformablePipeline {
-    /// Lets islands fall asleep that have been still.
-    fn fall_asleep(
-        &mut self,
-        deformables: &mut DeformableBodySet,
-        sets: RapierSets<'_>,
-        gravity: Vector,
-        h: f64,
-    ) {
-        self.sleeping.rigid.clear();
-        let gravity = from_real(gravity);
-        for island in &self.islands {
-            self.slept.clear();
-            self.slept.extend(island.handles.iter().copied());
-            for handle in &self.slept {
-                if let Some(body) = deformables.get_mut(*handle) {
-                    body.count_stillness(h);
-                }
-            }
-            let (scene, candidates) = (&self.scene, &self.candidates);
-            self.sleeping.fall_asleep(island, &self.slept, deformables, scene, candidates, sets, &gravity, h);
         }
     }
 }

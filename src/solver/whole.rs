@@ -138,3 +138,42 @@ impl BodyProblem {
         self.evaluate_current();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn vectors(n: usize) -> impl Strategy<Value = Vec<Vec3>> {
+        proptest::collection::vec([-1.0..1.0f64, -1.0..1.0, -1.0..1.0].prop_map(Vec3::from), n)
+    }
+
+    proptest! {
+        /// Rigid: distances stay to first order, and momentum and its moment are those of the forces; by blocks too.
+        #[test]
+        fn a_body_that_keeps_its_shape_takes_all_of_the_forces(
+            x in vectors(6),
+            forces in vectors(6),
+            masses in proptest::collection::vec(0.1..2.0f64, 6),
+        ) {
+            let mobility = 3e-4;
+            let mut mode = RigidMode::default();
+            mode.set(&x, &masses, mobility);
+            let mut moved = vec![Vec3::zeros(); 6];
+            mode.apply(&forces, &mut moved);
+            let centre = x.iter().zip(&masses).map(|(x, m)| x * *m).sum::<Vec3>() / masses.iter().sum::<f64>();
+            let (mut force, mut moment) = (Vec3::zeros(), Vec3::zeros());
+            for i in 0..6 {
+                force += forces[i] - moved[i] * (masses[i] / mobility);
+                moment += (x[i] - centre).cross(&(forces[i] - moved[i] * (masses[i] / mobility)));
+                let by_blocks: Vec3 = (0..6).map(|j| mode.compliance(i, j) * forces[j]).sum();
+                prop_assert!((by_blocks - moved[i]).norm() < 1e-12);
+                for j in 0..6 {
+                    prop_assert!((x[i] - x[j]).dot(&(moved[i] - moved[j])).abs() < 1e-12);
+                }
+            }
+            // 1e-9: inertia of random points is conditioned up to 1e3.
+            prop_assert!(force.norm() < 1e-9 && moment.norm() < 1e-9, "{} {}", force, moment);
+        }
+    }
+}
