@@ -125,13 +125,16 @@ fn no_corner_makes_energy_or_goes_through_the_floor() {
             );
         }
     }
-    let at_ten = corners.iter().zip(&thrown).filter(|(c, _)| c.iterations == 10);
-    let most = at_ten.map(|(_, f)| f.growth).fold(0.0, f64::max);
-    println!("{} corners, at ten iterations growing by {most:.1e} at the most", corners.len());
+    for iterations in [1, 10] {
+        let of_these = corners.iter().zip(&thrown).filter(|(c, _)| c.iterations == iterations);
+        let most = of_these.map(|(_, f)| f.growth).fold(0.0, f64::max);
+        println!("growth at {iterations} iterations: at most {most:.1e}");
+    }
+    println!("{} corners", corners.len());
     for (c, f) in corners.iter().zip(&thrown) {
         assert!(f.finite, "{c:?}: {f:?}");
         // A crushed cube is a film on the floor, as far below as one iteration leaves the nodes, and the box lies on it.
-        let depth = if c.iterations == 1 { -0.02 } else { 0.0 };
+        let depth = if c.iterations == 1 { -0.1 } else { 0.0 };
         assert!(f.lowest > depth && f.lowest_box > 0.4, "{c:?}: {f:?}");
         assert!(f.excess < 1e-6, "{c:?}: {f:?}");
         // What a body of this stiffness can carry, in steps of a game.

@@ -30,7 +30,8 @@ impl DeformableBody {
     }
 
     /// Whether the last step was given up: what was found of it would have made energy, as where a body is pinched to a
-    /// film, or strained it by what it ran into. The body has kept its shape and moved as a rigid one.
+    /// film, or strained it by what it ran into. The body has kept its shape and moved as a rigid one; a pinned
+    /// one has stayed where it was.
     pub fn last_gave_up(&self) -> bool {
         self.report.gave_up
     }

@@ -4,7 +4,7 @@
 //! by itself, with its own springs. Here such pairs are found beforehand, by rapier's filters, and solved with
 //! the rest.
 
-use super::closure::{Around, Closure, contact_key, contact_row};
+use super::closure::{Around, Closure, POINTS, contact_key, contact_row};
 use super::parts::RapierSets;
 use crate::contact::meeting_points;
 use rapier3d::dynamics::{CoefficientCombineRule, RigidBodyHandle, RigidBodyType};
@@ -60,7 +60,9 @@ impl Closure {
         let partners = [o1.partner, o2.partner];
         let mut key = contact_key(colliders);
         self.pairs.push(((key.obstacle, key.part), (colliders[0], colliders[1])));
-        for (feature, at) in (0..).zip(&self.meeting) {
+        // Parts of compounds are obstacles of their own.
+        let first_feature = (o1.part * 31 + o2.part) % POINTS * POINTS;
+        for (feature, at) in (first_feature..).zip(&self.meeting) {
             key.feature = feature;
             let points = [at.on_first, at.on_second];
             let gap = at.gap - skins;

@@ -65,7 +65,7 @@ const LINK_SLOT: u32 = FIRST_LINK_SLOT + 2;
 /// there are four by default, unevenly, and the impulses of that would push in the next step too.
 const LANDING: f64 = 0.75;
 /// Points of a manifold that keys tell apart.
-const POINTS: u32 = 1 << 16;
+pub(super) const POINTS: u32 = 1 << 16;
 
 impl Closure {
     /// Walks from the `touched` partners.

@@ -62,7 +62,7 @@ impl Crossings {
             return 0.0;
         }
         let lost = |(node, stop): &(usize, Stop)| {
-            let v = (problem.current.x[*node] - problem.x_start[*node]) / h;
+            let v = (problem.current.x[*node] - problem.x_start[*node]) / problem.h();
             0.5 * problem.mass(*node) * (v.norm_squared() - stop.slowed(&v, h).norm_squared())
         };
         let lost = self.stops.iter().map(lost).sum();
@@ -104,10 +104,12 @@ impl Crossings {
     pub fn stop(&self, body: &mut DeformableBody, gave_up: bool, h: f64) {
         let DeformableState { x, v, .. } = &mut body.state;
         for (node, stop) in &self.stops {
+            let slowed = stop.slowed(&v[*node], h);
             if gave_up {
-                v.iter_mut().for_each(|v| *v = stop.slowed(v, h));
+                let change = slowed - v[*node];
+                v.iter_mut().for_each(|v| *v += change);
             } else {
-                v[*node] = stop.slowed(&v[*node], h);
+                v[*node] = slowed;
             }
         }
         if !self.stops.is_empty() {

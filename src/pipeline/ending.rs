@@ -31,6 +31,7 @@ impl DeformablePipeline {
                 }
                 if again {
                     work.island.move_as_wholes(&self.factors, &scene.partners, h, &limits);
+                    work.island.give_up_what_gains_energy(&self.factors, &scene.partners, h, &limits);
                 }
             }
         }

@@ -90,7 +90,7 @@ pub struct DeformableCounters {
     pub factor_bytes: usize,
     /// Bytes of columns held.
     pub column_bytes: usize,
-    /// Bodies whose step would have made energy, and that moved as rigid ones instead.
+    /// Bodies whose step would have made energy, and that kept their shapes instead.
     pub gave_up: usize,
     /// Bodies put aside because their state was not finite.
     pub quarantined: usize,

@@ -2,7 +2,7 @@
 
 use super::work::IslandWork;
 use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Surroundings, TIME_UNTIL_SLEEP};
-use crate::contact::Candidates;
+use crate::contact::{Candidates, Law};
 use crate::coupling::{RapierScene, RapierSets};
 use crate::math::{Pose64, Vec3};
 use rapier3d::dynamics::{RigidBody, RigidBodyHandle};
@@ -132,7 +132,15 @@ impl Sleeping {
             return;
         }
         let first = self.rigid.len();
-        for side in island.island.contacts.rows.iter().flat_map(|row| &row.sides) {
+        let contacts = &island.island.contacts;
+        // What is only about to meet another rigid body stays awake.
+        let touching = |i: &usize| {
+            let row = &contacts.rows[*i];
+            let between_rigid = row.key.is_link() && matches!(row.law, Law::Contact { .. });
+            !between_rigid || contacts.force(*i) != Vec3::zeros()
+        };
+        let rows = (0..contacts.rows.len()).filter(touching).map(|i| &contacts.rows[i]);
+        for side in rows.flat_map(|row| &row.sides) {
             let Some(partner) = side.partner().filter(|p| scene.partners.yields(*p)) else { continue };
             let Some(handle) = scene.handles[partner.0 as usize] else { continue };
             if !scene.is_still(sets, handle) {

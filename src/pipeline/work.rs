@@ -301,6 +301,10 @@ impl IslandWork {
     /// What the contacts of a member leave to the next step, ascending by key.
     pub fn memory_of(&self, member: usize, h: f64, memory: &mut Vec<ContactMemory>) {
         memory.clear();
+        // What held a rigid shape says nothing of the next step.
+        if self.island.bodies[member].gave_up {
+            return;
+        }
         let own = |row: &Row| matches!(row.sides[0], Side::Soft { body, .. } if body == member);
         let own = self.active_rows().filter(|(_, row)| own(row) && !row.key.is_link());
         memory.extend(own.map(|(i, _)| self.island.contacts.memory(i, h)));

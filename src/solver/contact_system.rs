@@ -50,6 +50,8 @@ pub(crate) struct ContactLimits {
     pub tolerance: f64,
 }
 
+/// Compliance [m/N] of contacts of a body that keeps its shape with itself: any positive number.
+const WITHIN_A_SHAPE: f64 = 1.0e-6;
 /// Solves with a fresh shift per global iteration.
 const SHIFT_ROUNDS: usize = 2;
 
@@ -249,6 +251,10 @@ impl ContactSystem {
             let is_own = row.sides.iter().any(|side| side.is_of(index));
             if is_own && row.compliance == 0.0 {
                 row.goal = if let Law::Held { .. } = row.law { 0.0 } else { row.goal.max(0.0) };
+                // Within a rigid shape nothing moves, and W would be zero there.
+                if row.sides.iter().all(|side| side.is_of(index)) {
+                    row.compliance = WITHIN_A_SHAPE;
+                }
             }
             if i < self.active && (is_own || row.sides.iter().all(is_rigid)) {
                 self.lambda[self.problem.offsets[i]..self.problem.offsets[i + 1]].fill(0.0);

@@ -115,7 +115,7 @@ impl Island {
 
     /// Bodies whose step is far from solved and would gain energy give it up: where forces change wildly from iteration
     /// to iteration, what they have done to a body is not what the last ones take from others.
-    fn give_up_what_gains_energy(
+    pub fn give_up_what_gains_energy(
         &mut self,
         factors: &FactorCache,
         partners: &Partners,
@@ -178,6 +178,7 @@ impl Island {
             if body.gave_up {
                 body.end_as_a_whole();
             } else {
+                body.bend_step_to_rotation();
                 body.evaluate_trial();
                 body.accept_trial();
             }
