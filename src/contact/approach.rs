@@ -18,6 +18,9 @@ pub(crate) struct MeetingPoint {
 
 /// Points beyond which two obstacles meet in too many places to be worth looking ahead.
 const MOST_POINTS: usize = 32;
+/// Depth \[m\] that two obstacles have to reach: less is what rapier leaves of contacts at rest, as of a box that slides
+/// towards the next tile of a floor.
+const LEAST_DEPTH: f64 = 1.0e-3;
 /// Share of the motion over the step by which points may overlap at its start along the normal that they have at its
 /// end: more, and that is not the way by which they came.
 const BEHIND: f64 = 0.1;
@@ -38,7 +41,9 @@ pub(crate) fn meeting_points(first: &Obstacle, second: &Obstacle, skins: f64, fo
         &mut manifolds,
         &mut None,
     );
-    if known.is_err() {
+    let points = manifolds.iter().flat_map(|manifold| &manifold.points);
+    let deepest = points.map(|point| f64::from(point.dist)).fold(f64::INFINITY, f64::min);
+    if known.is_err() || deepest - skins > -LEAST_DEPTH {
         return;
     }
     for manifold in &manifolds {
@@ -59,5 +64,46 @@ pub(crate) fn meeting_points(first: &Obstacle, second: &Obstacle, skins: f64, fo
     }
     if found.len() - start > MOST_POINTS {
         found.truncate(start);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::PartnerId;
+    use crate::math::{Mat3, Pose64};
+    use parry3d::shape::SharedShape;
+
+    fn cuboid(half: [f32; 3], at: Vec3, motion: Vec3) -> Obstacle {
+        let pose = |translation| Pose64 { rotation: Mat3::identity(), translation };
+        let shape = SharedShape::cuboid(half[0], half[1], half[2]);
+        Obstacle { partner: PartnerId(0), key: 0, part: 0, shape, start: pose(at), end: pose(at + motion) }
+    }
+
+    /// Seen from a box that stands a little in a floor or falls onto it.
+    fn found(tile: &Obstacle, height: f64, motion: Vec3) -> Vec<MeetingPoint> {
+        let mut found = Vec::new();
+        let standing = cuboid([0.1; 3], Vec3::new(-0.13, 0.1 + height, 0.0), motion);
+        meeting_points(tile, &standing, 0.0, &mut found);
+        found
+    }
+
+    #[test]
+    fn floors_are_met_from_above_and_are_no_walls() {
+        let tile = cuboid([1.0, 0.1, 1.0], Vec3::new(1.0, -0.1, 0.0), Vec3::zeros());
+        let below = cuboid([1.0, 0.1, 1.0], Vec3::new(0.0, -0.1, 0.0), Vec3::zeros());
+        // 3 cm before the next tile, at 5 cm a step.
+        assert!(found(&tile, -1e-5, Vec3::new(0.05, 0.0, 0.0)).is_empty());
+        assert!(found(&below, 0.03, Vec3::new(0.0, -0.02, 0.0)).is_empty());
+        let met = found(&below, 0.01, Vec3::new(0.02, -0.05, 0.0));
+        assert_eq!(met.len(), 4);
+        for point in &met {
+            assert!((point.normal - Vec3::y()).norm() < 1e-6 && (point.gap - 0.01).abs() < 1e-6, "{point:?}");
+        }
+        // A wall is one.
+        let wall = cuboid([0.1, 1.0, 1.0], Vec3::new(0.1, 0.0, 0.0), Vec3::zeros());
+        let met = found(&wall, 0.0, Vec3::new(0.05, 0.0, 0.0));
+        assert!(!met.is_empty() && met.iter().all(|p| (p.normal + Vec3::x()).norm() < 1e-6), "{met:?}");
+        assert!(met.iter().all(|p| (p.gap - 0.03).abs() < 1e-6));
     }
 }

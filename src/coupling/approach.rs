@@ -5,8 +5,10 @@
 //! the rest.
 
 use super::closure::{Around, Closure, POINTS, contact_key, contact_row};
+use super::obstacles::{RapierScene, carried};
 use super::parts::RapierSets;
-use crate::contact::meeting_points;
+use crate::contact::{Obstacle, meeting_points};
+use crate::solver::Partner;
 use rapier3d::dynamics::{CoefficientCombineRule, RigidBodyHandle, RigidBodyType};
 use rapier3d::geometry::{Collider, ColliderHandle};
 
@@ -37,9 +39,9 @@ impl Closure {
         let colliders = obstacles.map(|o| scene.colliders[o]);
         let [Some(first), Some(second)] = colliders.map(|c| sets.colliders.get(c)) else { return };
         let skins = f64::from(first.contact_skin() + second.contact_skin());
-        let [o1, o2] = obstacles.map(|o| &scene.obstacles[o]);
+        let [o1, o2] = obstacles.map(|o| coasting(scene, o, around.dt));
         self.meeting.clear();
-        meeting_points(o1, o2, skins, &mut self.meeting);
+        meeting_points(&o1, &o2, skins, &mut self.meeting);
         if self.meeting.is_empty() {
             return;
         }
@@ -70,6 +72,17 @@ impl Closure {
         }
         partners.into_iter().for_each(|partner| self.reach(around, partner));
     }
+}
+
+/// An obstacle as its velocity leads it on: forces, as gravity where it lies on a floor, make no meeting.
+fn coasting(scene: &RapierScene, obstacle: usize, dt: f64) -> Obstacle {
+    let mut obstacle = scene.obstacles[obstacle].clone();
+    if let Partner::Rigid { com, twist, .. } | Partner::Link { com, twist, .. } =
+        scene.partners.get(obstacle.partner)
+    {
+        obstacle.end = carried(&obstacle.start, com, twist, dt);
+    }
+    obstacle
 }
 
 /// Whether rapier would let two colliders touch that it has no contact of. With hooks in play it is left to rapier.

@@ -325,10 +325,13 @@ pub(super) fn external_force(body: &RigidBody, masses: &RigidBodyMassProps, grav
 fn end_pose(partner: &Partner, start: &Pose64, dt: f64) -> Pose64 {
     match partner {
         Partner::Prescribed { end, .. } => *end,
-        Partner::Rigid { com, free, .. } | Partner::Link { com, free, .. } => {
-            let turn = rotation_from_vector(&(free.angular * dt));
-            let origin: Vec3 = com + free.linear * dt + turn * (start.translation - com);
-            Pose64 { rotation: turn * start.rotation, translation: origin }
-        }
+        Partner::Rigid { com, free, .. } | Partner::Link { com, free, .. } => carried(start, com, free, dt),
     }
+}
+
+/// A pose after a motion of `dt` \[s\] about a centre of mass.
+pub(super) fn carried(start: &Pose64, com: &Vec3, twist: &Twist, dt: f64) -> Pose64 {
+    let turn = rotation_from_vector(&(twist.angular * dt));
+    let origin: Vec3 = com + twist.linear * dt + turn * (start.translation - com);
+    Pose64 { rotation: turn * start.rotation, translation: origin }
 }
