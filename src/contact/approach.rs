@@ -1,7 +1,7 @@
 //! Where two obstacles that are apart will meet.
 
 use super::obstacle::Obstacle;
-use crate::math::{Vec3, from_real};
+use crate::math::{Pose64, Vec3, from_real};
 use parry3d::math::Pose;
 use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
 
@@ -47,15 +47,9 @@ pub(crate) fn meeting_points(first: &Obstacle, second: &Obstacle, skins: f64, fo
         return;
     }
     for manifold in &manifolds {
-        let place = |of: &Obstacle, part: Option<&Pose>, p| {
-            of.start.transform(&from_real(part.map_or(p, |part| part.transform_point(p))))
-        };
-        let [part1, part2] = [manifold.subshape_pos1(), manifold.subshape_pos2()];
-        let local = part1.map_or(manifold.local_n1, |part| part.rotation * manifold.local_n1);
-        let normal = first.start.rotation * from_real(local);
-        for point in manifold.points.iter().filter(|point| f64::from(point.dist) < skins) {
-            let on_first = place(first, part1, point.local_p1);
-            let on_second = place(second, part2, point.local_p2);
+        let (normal, places) = placed(manifold, [&first.start, &second.start]);
+        let points = manifold.points.iter().zip(places);
+        for (_, [on_first, on_second]) in points.filter(|(point, _)| f64::from(point.dist) < skins) {
             let gap = normal.dot(&(on_second - on_first));
             if gap - skins > -BEHIND * motion {
                 found.push(MeetingPoint { on_first, on_second, normal, gap });
@@ -67,11 +61,29 @@ pub(crate) fn meeting_points(first: &Obstacle, second: &Obstacle, skins: f64, fo
     }
 }
 
+/// The normal of a manifold's first shape, and its pairs of points, in the world, given the poses of the shapes.
+/// Composite shapes place their parts.
+pub(crate) fn placed<'a, D, P>(
+    manifold: &'a ContactManifold<D, P>,
+    poses: [&Pose64; 2],
+) -> (Vec3, impl Iterator<Item = [Vec3; 2]> + 'a) {
+    let place = |pose: &Pose64, part: Option<&Pose>| {
+        part.map_or(*pose, |part| pose.compose(&Pose64::from_real(part)))
+    };
+    let pose1 = place(poses[0], manifold.subshape_pos1());
+    let pose2 = place(poses[1], manifold.subshape_pos2());
+    let normal = pose1.rotation * from_real(manifold.local_n1);
+    let points = manifold.points.iter().map(move |point| {
+        [pose1.transform(&from_real(point.local_p1)), pose2.transform(&from_real(point.local_p2))]
+    });
+    (normal, points)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::contact::PartnerId;
-    use crate::math::{Mat3, Pose64};
+    use crate::math::Mat3;
     use parry3d::shape::SharedShape;
 
     fn cuboid(half: [f32; 3], at: Vec3, motion: Vec3) -> Obstacle {

@@ -20,7 +20,7 @@ mod tangle;
 mod thin;
 mod triangle_rows;
 
-pub(crate) use approach::{MeetingPoint, meeting_points};
+pub(crate) use approach::{MeetingPoint, meeting_points, placed};
 pub(crate) use between::{BetweenDetector, SoftPair, SoftSurface};
 pub(crate) use candidates::Candidates;
 pub(crate) use detection::{Detector, Pair, STATIC_MARGIN};

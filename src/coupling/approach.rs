@@ -5,11 +5,11 @@
 //! the rest.
 
 use super::closure::{Around, Closure, POINTS, contact_key, contact_row};
-use super::obstacles::{RapierScene, carried};
+use super::obstacles::{RapierScene, carried, coefficients};
 use super::parts::RapierSets;
 use crate::contact::{Obstacle, meeting_points};
 use crate::solver::Partner;
-use rapier3d::dynamics::{CoefficientCombineRule, RigidBodyHandle, RigidBodyType};
+use rapier3d::dynamics::{RigidBodyHandle, RigidBodyType};
 use rapier3d::geometry::{Collider, ColliderHandle};
 
 impl Closure {
@@ -45,20 +45,7 @@ impl Closure {
         if self.meeting.is_empty() {
             return;
         }
-        let (material1, material2) = (first.material(), second.material());
-        let combine = |a, b, rule1, rule2| f64::from(CoefficientCombineRule::combine(a, b, rule1, rule2));
-        let friction = combine(
-            material1.friction,
-            material2.friction,
-            material1.friction_combine_rule,
-            material2.friction_combine_rule,
-        );
-        let restitution = combine(
-            material1.restitution,
-            material2.restitution,
-            material1.restitution_combine_rule,
-            material2.restitution_combine_rule,
-        );
+        let coefficients = coefficients(first.material(), second.material());
         let partners = [o1.partner, o2.partner];
         let mut key = contact_key(colliders);
         self.pairs.push(((key.obstacle, key.part), (colliders[0], colliders[1])));
@@ -68,7 +55,7 @@ impl Closure {
             key.feature = feature;
             let points = [at.on_first, at.on_second];
             let gap = at.gap - skins;
-            self.rows.push(contact_row(partners, points, &at.normal, gap, [friction, restitution], key));
+            self.rows.push(contact_row(partners, points, &at.normal, gap, coefficients, key));
         }
         partners.into_iter().for_each(|partner| self.reach(around, partner));
     }

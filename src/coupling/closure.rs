@@ -9,11 +9,11 @@ use super::joint_rows::{JointEnds, drive_rows, joint_rows};
 use super::obstacles::RapierScene;
 use super::parts::{RapierSets, packed, unpacked};
 use crate::body::{ContactKey, FIRST_LINK_SLOT};
-use crate::contact::{Candidates, Law, MeetingPoint, PartnerId, Row, Side};
-use crate::math::{Pose64, Vec3, from_real};
+use crate::contact::{Candidates, Law, MeetingPoint, PartnerId, Row, Side, placed};
+use crate::math::{Pose64, Vec3};
 use crate::solver::Partner;
 use rapier3d::dynamics::{ImpulseJointHandle, MultibodyIndex, RigidBodyHandle};
-use rapier3d::geometry::{ColliderHandle, ContactManifold, ContactPair, SolverFlags};
+use rapier3d::geometry::{ColliderHandle, ContactPair, SolverFlags};
 use rapier3d::math::Vector;
 use std::collections::HashSet;
 
@@ -232,7 +232,7 @@ pub(super) fn contact_row(
     points: [Vec3; 2],
     normal: &Vec3,
     gap: f64,
-    [friction, restitution]: [f64; 2],
+    (friction, restitution): (f64, f64),
     key: ContactKey,
 ) -> Row {
     let sides = [1, 0].map(|k| Side::Partner { partner: partners[k], point: points[k] });
@@ -259,24 +259,13 @@ fn contact_rows(
         if !manifold.data.solver_flags.contains(SolverFlags::COMPUTE_RIGID_IMPULSES) {
             continue;
         }
-        let offset = |pose: &Pose64, which: usize| subshape_pose(manifold, which, pose);
-        let (pose1, pose2) = (offset(poses[0], 0), offset(poses[1], 1));
-        let normal = pose1.rotation * from_real(manifold.local_n1);
-        for (k, point) in (0u32..).zip(&manifold.points) {
-            let p1 = pose1.transform(&from_real(point.local_p1));
-            let p2 = pose2.transform(&from_real(point.local_p2));
+        let (normal, points) = placed(manifold, poses);
+        for (k, points) in (0u32..).zip(points) {
             let mut key = contact_key([pair.collider1, pair.collider2]);
             key.feature = (m % POINTS) * POINTS + k % POINTS;
-            let gap = (p2 - p1).dot(&normal) - skins;
-            let coefficients = [manifold.data.friction, manifold.data.restitution].map(f64::from);
-            rows.push(contact_row(partners, [p1, p2], &normal, gap, coefficients, key));
+            let gap = (points[1] - points[0]).dot(&normal) - skins;
+            let coefficients = (manifold.data.friction.into(), manifold.data.restitution.into());
+            rows.push(contact_row(partners, points, &normal, gap, coefficients, key));
         }
     }
-}
-
-/// Where a shape of a manifold is: composite shapes place their parts.
-fn subshape_pose(manifold: &ContactManifold, which: usize, pose: &Pose64) -> Pose64 {
-    let Some(parts) = &manifold.subshape_poses else { return *pose };
-    let part = if which == 0 { &parts.pos1 } else { &parts.pos2 };
-    part.as_ref().map_or(*pose, |part| pose.compose(&Pose64::from_real(part)))
 }

@@ -10,7 +10,7 @@ use parry3d::shape::{SharedShape, TypedShape};
 use rapier3d::dynamics::{
     CoefficientCombineRule, RigidBody, RigidBodyHandle, RigidBodyMassProps, RigidBodyType,
 };
-use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet, InteractionGroups};
+use rapier3d::geometry::{Collider, ColliderHandle, ColliderMaterial, ColliderSet, InteractionGroups};
 use rapier3d::math::{Pose, Vector};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -211,30 +211,30 @@ pub(crate) fn combined(body: &DeformableBody, collider: &Collider) -> Option<(f6
     if !solved || !body.collision_groups().test(groups) {
         return None;
     }
-    let m = collider.material();
-    let rules = (m.friction_combine_rule, m.restitution_combine_rule);
-    Some(coefficients(body, (m.friction, m.restitution), rules))
+    Some(coefficients(&surface_of(body), collider.material()))
 }
 
 /// Friction and restitution of two deformable bodies by rapier's rules.
 pub(crate) fn combined_between(body: &DeformableBody, other: &DeformableBody) -> (f64, f64) {
-    let m = other.material();
-    let rules = (other.friction_combine_rule(), other.restitution_combine_rule());
-    coefficients(body, (m.friction as f32, m.restitution as f32), rules)
+    coefficients(&surface_of(body), &surface_of(other))
 }
 
-/// Friction and restitution of a body with what has these two, and these rules for them.
-fn coefficients(
-    body: &DeformableBody,
-    (friction, restitution): (f32, f32),
-    (friction_rule, restitution_rule): (CoefficientCombineRule, CoefficientCombineRule),
-) -> (f64, f64) {
-    let combine = |own: f64, other: f32, own_rule, other_rule| {
-        f64::from(CoefficientCombineRule::combine(own as f32, other, own_rule, other_rule))
-    };
-    let m = body.material();
-    let friction = combine(m.friction, friction, body.friction_combine_rule(), friction_rule);
-    let restitution = combine(m.restitution, restitution, body.restitution_combine_rule(), restitution_rule);
+/// What a body has on its surface, as rapier says it of colliders.
+fn surface_of(body: &DeformableBody) -> ColliderMaterial {
+    ColliderMaterial {
+        friction: body.material().friction as f32,
+        restitution: body.material().restitution as f32,
+        friction_combine_rule: body.friction_combine_rule(),
+        restitution_combine_rule: body.restitution_combine_rule(),
+    }
+}
+
+/// Friction and restitution of two surfaces.
+pub(super) fn coefficients(a: &ColliderMaterial, b: &ColliderMaterial) -> (f64, f64) {
+    let combine = |x, y, rule_x, rule_y| f64::from(CoefficientCombineRule::combine(x, y, rule_x, rule_y));
+    let friction = combine(a.friction, b.friction, a.friction_combine_rule, b.friction_combine_rule);
+    let restitution =
+        combine(a.restitution, b.restitution, a.restitution_combine_rule, b.restitution_combine_rule);
     // Beyond this no slope is left to slide on; infinity times zero would be no number.
     (friction.clamp(0.0, 1e4), restitution.clamp(0.0, 1.0))
 }

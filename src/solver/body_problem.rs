@@ -203,6 +203,11 @@ impl BodyProblem {
         self.masses[node]
     }
 
+    /// Displacement per force over mass of the body as a whole, h²/(1 + αh) [s²].
+    pub(super) fn mobility(&self) -> f64 {
+        self.h * self.h / (1.0 + self.material.mass_damping * self.h)
+    }
+
     /// The step \[s\] that the matrix is of.
     pub fn h(&self) -> f64 {
         self.h

@@ -13,7 +13,7 @@ impl BodyProblem {
     /// Moves and turns a body that nothing holds as a whole, so that its residual has neither force nor
     /// moment: what is left of it after a few iterations would set the body spinning. Deforms nothing.
     pub fn balance(&mut self) {
-        let mobility = self.h * self.h / (1.0 + self.material.mass_damping * self.h);
+        let mobility = self.mobility();
         let total: f64 = self.masses.iter().sum();
         let x = &mut self.current.x;
         let centre = x.iter().zip(&self.masses).map(|(x, m)| x * *m).sum::<Vec3>() / total;

@@ -46,6 +46,8 @@ enum FrameKind {
     Isotropic,
     Floating,
     PerNode,
+    /// None: the body keeps its shape.
+    Rigid,
 }
 
 /// The translation mode of per-node frames.
@@ -69,12 +71,14 @@ struct Deflation {
 impl Metric {
     /// The body keeps its shape.
     pub fn set_rigid(&mut self, x: &[Vec3], masses: &[f64], mobility: f64) {
+        self.kind = FrameKind::Rigid;
+        self.turns = false;
+        self.deflation.active = false;
         self.rigid.set(x, masses, mobility);
     }
 
     /// The scalar matrix: no frames.
     pub fn set_isotropic(&mut self) {
-        self.rigid.active = false;
         self.kind = FrameKind::Isotropic;
         self.turns = false;
         self.floating = Mat3::identity();
@@ -83,7 +87,6 @@ impl Metric {
 
     /// One frame for the body.
     pub fn set_floating(&mut self, rotation: &Mat3) {
-        self.rigid.active = false;
         self.kind = FrameKind::Floating;
         self.turns = false;
         self.floating = rounded_rotation(rotation, FRAME_BITS);
@@ -131,7 +134,6 @@ impl Metric {
         factor: &SystemFactor,
     ) {
         self.kind = FrameKind::PerNode;
-        self.rigid.active = false;
         self.turns = false;
         self.per_node.resize(x.len(), Mat3::zeros());
         node_rotations(model, x, &mut self.per_node);
@@ -146,7 +148,7 @@ impl Metric {
     pub fn deflate(&mut self, masses: &[f64], mobility: f64, factor: &SystemFactor) {
         let frames = match self.kind {
             FrameKind::PerNode => &self.per_node[..],
-            FrameKind::Isotropic | FrameKind::Floating => std::slice::from_ref(&self.floating),
+            _ => std::slice::from_ref(&self.floating),
         };
         let (serial, before) = &self.deflation.made_from;
         if *serial == Some(factor.serial) && before == frames {
@@ -179,7 +181,7 @@ impl Metric {
 
     /// `out = P r`: displacements \[m\] of forces \[N\].
     pub fn apply(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
-        if self.rigid.active {
+        if self.kind == FrameKind::Rigid {
             return self.rigid.apply(r, out);
         }
         if !self.deflation.active {
@@ -228,7 +230,7 @@ impl Metric {
     /// The frame of a node.
     fn frame(&self, node: usize) -> Mat3 {
         match self.kind {
-            FrameKind::Isotropic => Mat3::identity(),
+            FrameKind::Isotropic | FrameKind::Rigid => Mat3::identity(),
             FrameKind::Floating => self.floating,
             FrameKind::PerNode => self.per_node[node],
         }
@@ -236,7 +238,7 @@ impl Metric {
 
     /// The block of P between two surface nodes, given the one of `A⁻¹` [m/N].
     pub fn compliance(&self, factor: &SystemFactor, inverse_block: &Mat3, i: usize, j: usize) -> Mat3 {
-        if self.rigid.active {
+        if self.kind == FrameKind::Rigid {
             return self.rigid.compliance(i, j);
         }
         let block = match self.kind {
@@ -259,16 +261,16 @@ impl Metric {
     /// The one frame of the body, if it has one and that is all there is to its blocks.
     pub fn one_frame(&self) -> Option<Mat3> {
         match self.kind {
-            _ if self.rigid.active || self.deflation.active || self.turns => None,
+            _ if self.deflation.active || self.turns => None,
             FrameKind::Isotropic => Some(Mat3::identity()),
             FrameKind::Floating => Some(self.floating),
-            FrameKind::PerNode => None,
+            FrameKind::PerNode | FrameKind::Rigid => None,
         }
     }
 
     /// Whether every node has a frame of its own, as in bodies that bend.
     pub fn is_per_node(&self) -> bool {
-        self.kind == FrameKind::PerNode && !self.rigid.active
+        self.kind == FrameKind::PerNode
     }
 }
 

@@ -56,7 +56,7 @@ impl BodyProblem {
         if self.settings.solver == Solver::Newton {
             return self.metric.set_floating(&Mat3::identity());
         }
-        let mobility = self.h * self.h / (1.0 + self.material.mass_damping * self.h);
+        let mobility = self.mobility();
         let is_free = self.key.pins.is_empty();
         let per_node = factor.system != SystemMatrix::Laplacian
             && match self.settings.frames {

@@ -18,7 +18,6 @@ const STIFFENING: f64 = 1024.0;
 /// How a body moves that keeps its shape: displacements about its centre of mass.
 #[derive(Default)]
 pub(super) struct RigidMode {
-    pub active: bool,
     arms: Vec<Vec3>,
     /// `h²/(1 + αh)` over mass and inertia [m/N, 1/(N m)].
     by_force: f64,
@@ -39,7 +38,6 @@ impl RigidMode {
         for c in 0..3 {
             self.by_moment.set_column(c, &(solve_semidefinite(&inertia, &Vec3::ith(c, 1.0)) * mobility));
         }
-        self.active = true;
     }
 
     /// Displacements \[m\] of forces \[N\] on the nodes.
@@ -116,8 +114,7 @@ impl BodyProblem {
         let mut forces = std::mem::take(&mut self.force);
         forces.clone_from(&self.contact_force);
         if self.key.pins.is_empty() {
-            let mobility = self.h * self.h / (1.0 + self.material.mass_damping * self.h);
-            self.metric.set_rigid(&self.x_start, &self.masses, mobility);
+            self.metric.set_rigid(&self.x_start, &self.masses, self.mobility());
             self.scaling = 1.0;
             for (i, force) in forces.iter_mut().enumerate() {
                 *force += (self.target[i] - self.x_start[i]) * (self.masses[i] / (self.h * self.h));
