@@ -77,7 +77,7 @@ fn print_stages(stages: [Vec<f64>; 6]) {
     let [detect, factor, elements, linear, contact, advance] = stages.map(median);
     println!(
         "    ms: detect {detect:.3}, factor {factor:.3}, elements {elements:.3}, solves {linear:.3}, \
-         contact and closure {contact:.3}, advance {advance:.3}"
+         contact and neighbourhood {contact:.3}, advance {advance:.3}"
     );
 }
 

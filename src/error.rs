@@ -1,9 +1,57 @@
-//! The one public error type.
+//! The one public error type, and what a body or a set of them may answer.
 
-use crate::body::BodyError;
 use crate::material::MaterialError;
 use crate::mesh::MeshError;
+use rapier3d::math::Vector;
 use thiserror::Error;
+
+/// A request that a body cannot fulfil.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum BodyError {
+    /// No such vertex.
+    #[error("vertex {vertex} does not exist: the body has {vertices}")]
+    NoSuchVertex {
+        /// The index asked for.
+        vertex: usize,
+        /// Number of vertices of the body.
+        vertices: usize,
+    },
+    /// A state of another mesh.
+    #[error("the state has {vertices} vertices, the body {expected}")]
+    WrongSize {
+        /// Vertices of the state.
+        vertices: usize,
+        /// Vertices of the body.
+        expected: usize,
+    },
+    /// The vertex is inside of the body.
+    #[error("vertex {vertex} is not on the surface")]
+    NotOnSurface {
+        /// The index asked for.
+        vertex: usize,
+    },
+    /// The vertex is not pinned.
+    #[error("vertex {vertex} is not pinned")]
+    NotPinned {
+        /// The index asked for.
+        vertex: usize,
+    },
+    /// A value that is NaN or infinite.
+    #[error("{quantity} is not finite: {value}")]
+    NotFinite {
+        /// What was to be set.
+        quantity: &'static str,
+        /// Its value.
+        value: Vector,
+    },
+    /// No vertices to act on.
+    #[error("{quantity}: the list of vertices is empty")]
+    NoVertices {
+        /// What was to be applied.
+        quantity: &'static str,
+    },
+}
 
 /// A handle that names nothing.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]

@@ -27,14 +27,18 @@
 #![allow(non_snake_case)]
 
 mod math;
+mod profiler;
 
 mod mesh;
 
 mod energy;
 mod material;
 
-mod body;
 mod error;
+
+mod fem;
+
+mod body;
 
 mod contact;
 
@@ -45,19 +49,20 @@ mod coupling;
 mod pipeline;
 
 pub use body::{
-    Acceleration, AttachTo, BodyError, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
-    DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableModel, DeformableState,
-    FactorPrecision, Fidelity, Frames, Integrator, Pin, Solver, SolverSettings, SystemMatrix,
+    Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
+    DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableState, FactorPrecision,
+    Fidelity, Frames, Integrator, JointRole, Pin, Solver, SolverSettings,
 };
 pub use contact::DeformableSurfacePoint;
 pub use coupling::PhysicsParts;
 pub use energy::Elasticity;
-pub use error::{DeformableBodyError, HandleError};
+pub use error::{BodyError, DeformableBodyError, HandleError};
+pub use fem::{DeformableModel, SystemMatrix};
 pub use material::{DeformableMaterial, MaterialError};
 pub use mesh::{MeshError, Structure, TetMesh};
 pub use pipeline::{
     DeformableContact, DeformableCounters, DeformablePairContact, DeformableParameters, DeformablePipeline,
-    DeformableWorld, JointForce, JointRole, RigidContact, SolvedJoint,
+    DeformableWorld, JointForce, RigidContact, SolvedJoint,
 };
 
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.

@@ -1,7 +1,7 @@
 //! What a body is made of, in SI units.
 
-use crate::energy::Elasticity;
 use crate::energy::strain_limit::STIFFENING;
+use crate::energy::{Elasticity, Lame};
 use thiserror::Error;
 
 /// What is wrong with a material.
@@ -50,13 +50,6 @@ pub struct DeformableMaterial {
     pub strain_limits: Option<[f64; 2]>,
     /// Young's modulus of muscle fibres along their direction \[Pa\], of bodies that have such.
     pub fibre_modulus: f64,
-}
-
-/// Lamé parameters μ, λ \[Pa\].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Lame {
-    pub mu: f64,
-    pub lambda: f64,
 }
 
 impl DeformableMaterial {

@@ -1,4 +1,4 @@
-//! What accuracy costs: every rung of the ladder of solvers over a set of scenes, against Newton's method and
+//! What accuracy costs: every method of the ladder of solvers over a set of scenes, against Newton's method and
 //! rapier's own soft bodies. `cargo bench --bench trade`; `-- NAME` for the scenes of
 //! that name alone, or the tables of `presets` or `steps`.
 //!
@@ -8,23 +8,23 @@
 //! 1e-10 up to 1000 tetrahedra, and beyond the default solver to 1e-9, which comes to the same
 //! (`tests/solvers.rs`).
 
+mod methods;
 mod plot;
 mod rapier;
-mod rungs;
 mod scenes;
 #[path = "../shared/mod.rs"]
 mod shared;
 
 use foible3d::prelude::*;
-use rungs::{Choice, Rung, presets, reference, rungs};
+use methods::{Choice, Method, methods, presets, reference};
 use scenes::{Kind, Measure, Record, Scene, scenes};
 use std::fmt::Write as _;
 
-/// One run of one rung in one scene.
+/// One run of one method in one scene.
 struct Point {
     scene: String,
     family: String,
-    rung: String,
+    method: String,
     ms: f64,
     error: f64,
 }
@@ -40,9 +40,9 @@ fn main() {
     for scene in scenes().into_iter().filter(|scene| is_wanted(&scene.name)) {
         let truth = scene.run(&reference(scene.tets()));
         println!("\n{} ({} elements, h = 1/{:.0})", scene.name, scene.tets(), 1.0 / scene.dt);
-        for rung in rungs(&scene) {
-            let record = scene.run(&rung);
-            report(&scene, &rung.family, &rung.name, &record, &truth, &mut csv, &mut points);
+        for method in methods(&scene) {
+            let record = scene.run(&method);
+            report(&scene, &method.family, &method.name, &record, &truth, &mut csv, &mut points);
         }
         for setting in rapier::SETTINGS {
             if let Some(record) = rapier::run(&scene, setting) {
@@ -71,7 +71,7 @@ fn main() {
 fn report(
     scene: &Scene,
     family: &str,
-    rung: &str,
+    method: &str,
     record: &Record,
     truth: &Record,
     csv: &mut String,
@@ -80,7 +80,7 @@ fn report(
     let error = record.error(truth, scene.measure);
     println!(
         "  {:<34} {:>8.3} ms {:>8.2} worst  error {:>8.1e}  volume {:>8.1e}  force {:>8.1e}  deepest {:>8.1e} m",
-        format!("{family}, {rung}"),
+        format!("{family}, {method}"),
         record.median(),
         record.worst(),
         error,
@@ -89,11 +89,11 @@ fn report(
         record.deepest
     );
     let engine = if family == "rapier" { "rapier" } else { "foible3d" };
-    note(scene, engine, family, rung, record, error, csv);
+    note(scene, engine, family, method, record, error, csv);
     points.push(Point {
         scene: scene.name.clone(),
         family: family.into(),
-        rung: rung.into(),
+        method: method.into(),
         ms: record.median(),
         error,
     });
@@ -104,14 +104,14 @@ fn note(
     scene: &Scene,
     engine: &str,
     family: &str,
-    rung: &str,
+    method: &str,
     record: &Record,
     error: f64,
     csv: &mut String,
 ) {
     let _ = writeln!(
         csv,
-        "{},{engine},{family} {rung},{},{},{:.5},{:.5},{error:.4e},{:.4e},{:.4e},{:.4e}",
+        "{},{engine},{family} {method},{},{},{:.5},{:.5},{error:.4e},{:.4e},{:.4e},{:.4e}",
         scene.name,
         scene.tets(),
         scene.dt,
@@ -130,23 +130,23 @@ fn preset_table(csv: &mut String, points: &mut Vec<Point>) {
         let swing = Scene::cantilever("presets swing", cells, 1e6, 0.3, Measure::Path);
         let sag = Scene::cantilever("presets sag", cells, 1e6, 0.3, Measure::End);
         let truths = [&swing, &sag].map(|scene| scene.run(&reference(scene.tets())));
-        for rung in presets() {
+        for method in presets() {
             // Newton's method at that size takes minutes and is what the others are measured by.
-            if rung.name == "Reference" && swing.tets() > 5000 {
+            if method.name == "Reference" && swing.tets() > 5000 {
                 continue;
             }
-            let records = [&swing, &sag].map(|scene| scene.run(&rung));
+            let records = [&swing, &sag].map(|scene| scene.run(&method));
             let errors = [0, 1].map(|k| records[k].error(&truths[k], [swing.measure, sag.measure][k]));
             println!(
                 "  {:>6} tets  {:<12} {:>8.3} ms  swing {:>8.1e}  sag {:>8.1e}",
                 swing.tets(),
-                rung.name,
+                method.name,
                 records[0].median(),
                 errors[0],
                 errors[1]
             );
             for (k, scene) in [&swing, &sag].into_iter().enumerate() {
-                note(scene, "foible3d", "preset", &rung.name, &records[k], errors[k], csv);
+                note(scene, "foible3d", "preset", &method.name, &records[k], errors[k], csv);
             }
         }
         for setting in rapier::SETTINGS {
@@ -168,8 +168,8 @@ fn mesh_table() {
             for cells in [[11, 3, 3], [16, 4, 4], [25, 5, 5], [32, 8, 8]] {
                 let scene =
                     |measure| Scene { smoothed, ..Scene::cantilever("meshes", cells, 1e7, nu, measure) };
-                let rung = &presets()[1];
-                let (swing, rest) = (scene(Measure::Path).run(rung), scene(Measure::End).run(rung));
+                let method = &presets()[1];
+                let (swing, rest) = (scene(Measure::Path).run(method), scene(Measure::End).run(method));
                 let tip = rest.start[1] - rest.path.last().map_or(f64::NAN, |p| p[1]);
                 let (e, g) = (1e7, f64::from(9.81f32));
                 let shear = 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu) * e / (2.0 * (1.0 + nu)) * 0.04;
@@ -198,8 +198,8 @@ fn mode_table() {
         scene.steps = 2 * per_second;
         let settings =
             SolverSettings { integrator, tolerance: 1e-8, max_iterations: 50, ..SolverSettings::default() };
-        let rung = Rung { family: "mode".into(), name: "mode".into(), choice: Choice::Own(settings) };
-        let height: Vec<f64> = scene.run(&rung).path.iter().map(|p| p[1]).collect();
+        let method = Method { family: "mode".into(), name: "mode".into(), choice: Choice::Own(settings) };
+        let height: Vec<f64> = scene.run(&method).path.iter().map(|p| p[1]).collect();
         // Turning points by parabolas through three heights.
         let turns: Vec<(f64, f64)> = (1..height.len() - 1)
             .filter(|&i| (height[i] - height[i - 1]) * (height[i + 1] - height[i]) <= 0.0)
@@ -237,7 +237,7 @@ fn step_table(csv: &mut String) {
         scene.dt = 1.0 / per_second as f32;
         scene
     };
-    let rung = |integrator| Rung {
+    let method = |integrator| Method {
         family: "steps".into(),
         name: format!("{integrator:?}"),
         choice: Choice::Own(SolverSettings {
@@ -252,18 +252,18 @@ fn step_table(csv: &mut String) {
         path: record.path.iter().skip(n - 1).step_by(n).copied().collect(),
         ..record.clone()
     };
-    let truth = coarse(&scene(3840).run(&rung(Integrator::Bdf2)), 3840 / 30);
+    let truth = coarse(&scene(3840).run(&method(Integrator::Bdf2)), 3840 / 30);
     for per_second in [30, 60, 120, 240, 480] {
         for integrator in [Integrator::ImplicitEuler, Integrator::Bdf2] {
-            let (scene, rung) = (scene(per_second), rung(integrator));
-            let record = scene.run(&rung);
+            let (scene, method) = (scene(per_second), method(integrator));
+            let record = scene.run(&method);
             let error = coarse(&record, per_second / 30).error(&truth, Measure::Path);
             println!(
                 "  h = 1/{per_second:<4} {:<14} error {error:.4}  {:.3} ms per step",
-                rung.name,
+                method.name,
                 record.median()
             );
-            note(&scene, "foible3d", "steps", &rung.name, &record, error, csv);
+            note(&scene, "foible3d", "steps", &method.name, &record, error, csv);
         }
     }
 }

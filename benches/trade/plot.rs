@@ -57,7 +57,7 @@ pub fn draw(path: &Path, points: &[Point]) -> Result<(), Box<dyn Error>> {
                 let named = own.iter().filter(|p| p.family == family);
                 chart.draw_series(named.map(|p| {
                     let font = ("sans-serif", 12).into_font().color(&color);
-                    Text::new(format!("  {}", p.rung), (p.ms, p.error.max(LEAST) * 1.15), font)
+                    Text::new(format!("  {}", p.method), (p.ms, p.error.max(LEAST) * 1.15), font)
                 }))?;
             }
         }

@@ -1,6 +1,6 @@
 //! The scenes, and how they are run and measured.
 
-use crate::rungs::{Choice, Rung};
+use crate::methods::{Choice, Method};
 use crate::shared::median;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
@@ -235,13 +235,13 @@ impl Scene {
         physics
     }
 
-    pub fn run(&self, rung: &Rung) -> Record {
+    pub fn run(&self, method: &Method) -> Record {
         if let Kind::Grasp { .. } = self.kind {
-            return self.run_grasp(rung);
+            return self.run_grasp(method);
         }
         let mut physics = self.world();
         let mut world = DeformableWorld::new();
-        let body = world.insert(chosen(self.builder(), rung)).expect("a valid body");
+        let body = world.insert(chosen(self.builder(), method)).expect("a valid body");
         let deformable = &mut world.bodies[body];
         let count = deformable.vertex_count();
         let watched: Vec<usize> =
@@ -279,12 +279,12 @@ impl Scene {
     }
 
     /// The box is watched.
-    fn run_grasp(&self, rung: &Rung) -> Record {
+    fn run_grasp(&self, method: &Method) -> Record {
         let mut stage = Grasp::new(self);
         let mut world = DeformableWorld::new();
         for (carrier, side) in stage.carriers {
             let pad = self.builder().translation(Grasp::pad(side));
-            let pad = world.insert(chosen(pad, rung)).expect("a valid body");
+            let pad = world.insert(chosen(pad, method)).expect("a valid body");
             let back = world.bodies[pad].vertices_where(|x| x.x.abs() > Grasp::BACK);
             let on = AttachTo::RigidBody(carrier, *stage.physics.bodies[carrier].position());
             world.bodies.attach(pad, &back, on).expect("surface vertices");
@@ -345,8 +345,8 @@ impl Grasp {
     }
 }
 
-fn chosen(builder: DeformableBodyBuilder, rung: &Rung) -> DeformableBodyBuilder {
-    match rung.choice {
+fn chosen(builder: DeformableBodyBuilder, method: &Method) -> DeformableBodyBuilder {
+    match method.choice {
         Choice::Preset(fidelity) => builder.fidelity(fidelity),
         Choice::Own(settings) => builder.settings(settings),
     }

@@ -1,15 +1,9 @@
 //! Vertices tied to rigid bodies, to the world, or to other deformable bodies.
 
-use super::body::BodyError;
-use super::set::{DeformableBodyHandle, DeformableBodySet};
-use crate::error::DeformableBodyError;
+use super::handle::{DeformableAttachmentHandle, DeformableBodyHandle};
 use crate::math::{Pose64, Vec3, to_real};
 use rapier3d::dynamics::RigidBodyHandle;
 use rapier3d::math::{Pose, Vector};
-
-/// Names an attachment of a [`DeformableBodySet`]; never used again after its removal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct DeformableAttachmentHandle(pub(crate) u64);
 
 /// What vertices are tied to.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,7 +47,7 @@ pub(crate) enum Anchors {
 
 /// A node that an attachment leads along a way that nothing can change: for the step it is as good as pinned.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Hold {
+pub(crate) struct PrescribedNode {
     pub node: u32,
     /// Where it is at the end of the step \[m\].
     pub target: Vec3,
@@ -61,6 +55,22 @@ pub(crate) struct Hold {
 }
 
 impl DeformableAttachment {
+    /// A hard one.
+    pub(super) fn new(body: DeformableBodyHandle, nodes: Vec<u32>, anchors: Anchors) -> Self {
+        Self {
+            body,
+            nodes,
+            anchors,
+            compliance: 0.0,
+            length: 0.0,
+            break_force: f64::INFINITY,
+            force: Vec3::zeros(),
+            broken: false,
+            changed: true,
+            rigid_pose: None,
+        }
+    }
+
     /// Whether it is of this body, or to it.
     pub(super) fn ties(&self, body: DeformableBodyHandle) -> bool {
         self.bodies().contains(&Some(body))
@@ -173,72 +183,5 @@ impl DeformableAttachment {
             self.broken = true;
             self.changed = true;
         }
-    }
-}
-
-impl DeformableBodySet {
-    /// Ties surface vertices of a body to something, where they are now.
-    ///
-    /// # Errors
-    /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody); [`BodyError::NoSuchVertex`];
-    /// [`BodyError::NotOnSurface`] for vertices inside of a body, which can be pinned but not attached;
-    /// [`BodyError::NoVertices`]; [`BodyError::NotFinite`] for a pose that is no number; [`BodyError::WrongSize`] if the two lists of vertices differ in length.
-    pub fn attach(
-        &mut self,
-        body: DeformableBodyHandle,
-        vertices: &[usize],
-        to: AttachTo,
-    ) -> Result<DeformableAttachmentHandle, DeformableBodyError> {
-        let nodes = self.surface_nodes(body, vertices)?;
-        let x = |node: &u32| self[body].state.x[*node as usize];
-        let anchors = match to {
-            AttachTo::World => Anchors::World(nodes.iter().map(x).collect()),
-            AttachTo::RigidBody(handle, pose) => {
-                super::body::finite("pose of the rigid body", pose.translation)?;
-                super::body::finite("rotation of the rigid body", pose.rotation.to_scaled_axis())?;
-                let pose = Pose64::from_real(&pose);
-                Anchors::Rigid(handle, nodes.iter().map(|n| pose.inverse_transform(&x(n))).collect())
-            }
-            AttachTo::Deformable(other, others) => {
-                if others.len() != nodes.len() {
-                    let error = BodyError::WrongSize { vertices: others.len(), expected: nodes.len() };
-                    return Err(error.into());
-                }
-                Anchors::Deformable(other, self.surface_nodes(other, &others)?)
-            }
-        };
-        let attachment = DeformableAttachment {
-            body,
-            nodes,
-            anchors,
-            compliance: 0.0,
-            length: 0.0,
-            break_force: f64::INFINITY,
-            force: Vec3::zeros(),
-            broken: false,
-            changed: true,
-            rigid_pose: None,
-        };
-        Ok(self.insert_attachment(attachment))
-    }
-
-    fn surface_nodes(
-        &self,
-        handle: DeformableBodyHandle,
-        vertices: &[usize],
-    ) -> Result<Vec<u32>, DeformableBodyError> {
-        let body = self.get(handle).ok_or_else(|| handle.no_such_body())?;
-        if vertices.is_empty() {
-            return Err(BodyError::NoVertices { quantity: "attachment" }.into());
-        }
-        let mut nodes = Vec::with_capacity(vertices.len());
-        for &vertex in vertices {
-            let node = body.node(vertex)?;
-            if body.model.surface.index_of_node[node] == u32::MAX {
-                return Err(BodyError::NotOnSurface { vertex }.into());
-            }
-            nodes.push(node as u32);
-        }
-        Ok(nodes)
     }
 }

@@ -1,12 +1,10 @@
 //! One deformable body as its user sees it.
 
-use super::elastic;
-use super::model::DeformableModel;
-use super::pins::Pin;
-use super::report::StepReport;
+use super::constraint_memory::ConstraintMemory;
 use super::settings::SolverSettings;
-use super::sleep::Sleep;
-use super::state::{ContactMemory, DeformableState, History};
+use super::state::{DeformableState, History, Sleep};
+use crate::error::BodyError;
+use crate::fem::{DeformableModel, Elements, volume};
 use crate::material::DeformableMaterial;
 use crate::math::{Vec3, from_real, to_real};
 use parry3d::bounding_volume::Aabb;
@@ -14,54 +12,25 @@ use rapier3d::dynamics::CoefficientCombineRule;
 use rapier3d::geometry::InteractionGroups;
 use rapier3d::math::Vector;
 use std::sync::Arc;
-use thiserror::Error;
 
-/// A request that a body cannot fulfil.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
-#[non_exhaustive]
-pub enum BodyError {
-    /// No such vertex.
-    #[error("vertex {vertex} does not exist: the body has {vertices}")]
-    NoSuchVertex {
-        /// The index asked for.
-        vertex: usize,
-        /// Number of vertices of the body.
-        vertices: usize,
-    },
-    /// A state of another mesh.
-    #[error("the state has {vertices} vertices, the body {expected}")]
-    WrongSize {
-        /// Vertices of the state.
-        vertices: usize,
-        /// Vertices of the body.
-        expected: usize,
-    },
-    /// The vertex is inside of the body.
-    #[error("vertex {vertex} is not on the surface")]
-    NotOnSurface {
-        /// The index asked for.
-        vertex: usize,
-    },
-    /// The vertex is not pinned.
-    #[error("vertex {vertex} is not pinned")]
-    NotPinned {
-        /// The index asked for.
-        vertex: usize,
-    },
-    /// A value that is NaN or infinite.
-    #[error("{quantity} is not finite: {value}")]
-    NotFinite {
-        /// What was to be set.
-        quantity: &'static str,
-        /// Its value.
-        value: Vector,
-    },
-    /// No vertices to act on.
-    #[error("{quantity}: the list of vertices is empty")]
-    NoVertices {
-        /// What was to be applied.
-        quantity: &'static str,
-    },
+/// A vertex held in place, or led along by its user.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pin {
+    pub(crate) node: u32,
+    pub(crate) target: Vec3,
+    /// Force that holds the vertex \[N\], of the last step.
+    pub(crate) force: Vec3,
+}
+
+/// How the last step of a body went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct StepReport {
+    pub iterations: usize,
+    pub residual: f64,
+    pub tolerance: f64,
+    pub guard_retries: usize,
+    pub is_rejected: bool,
+    pub quarantined: bool,
 }
 
 /// A deformable body: a shared model, a state, a material and the settings of its solver. Made by
@@ -95,7 +64,7 @@ impl DeformableBody {
             x: model.rest.clone(),
             v: vec![Vec3::zeros(); model.rest.len()],
             contacts: Vec::new(),
-            closure: Vec::new(),
+            shared: Vec::new(),
             history: History::default(),
             sleep: Sleep::default(),
         };
@@ -141,7 +110,7 @@ impl DeformableBody {
         // Contacts of another mesh of the same size would name nodes that are not on this surface.
         let surface = &self.model.surface.index_of_node;
         let known = |n: &u32| surface.get(*n as usize).is_some_and(|s| *s != u32::MAX);
-        let on_surface = |c: &ContactMemory| {
+        let on_surface = |c: &ConstraintMemory| {
             c.geometry.nodes[0].iter().zip(c.geometry.weights[0]).all(|(n, w)| w == 0.0 || known(n))
         };
         if !self.state.contacts.iter().all(on_surface) {
@@ -191,13 +160,13 @@ impl DeformableBody {
 
     /// Volume that the tetrahedra enclose now \[m³\]; sheets and rods enclose none.
     pub fn volume(&self) -> f64 {
-        elastic::volume(&self.model, &self.state.x)
+        volume(&self.model, &self.state.x)
     }
 
     // ── For the other rooms of the crate ────────────────────────────────
 
-    pub(crate) fn elements(&self) -> elastic::Elements<'_> {
-        elastic::Elements { model: &self.model, material: &self.material, activation: self.activation }
+    pub(crate) fn elements(&self) -> Elements<'_> {
+        Elements { model: &self.model, material: &self.material, activation: self.activation }
     }
 
     pub(crate) fn node_mass(&self, node: usize) -> f64 {

@@ -1,9 +1,9 @@
 //! Builder of deformable bodies, after rapier's own builders.
 
 use super::body::DeformableBody;
-use super::model::DeformableModel;
-use super::settings::{Build, Fidelity, SolverSettings};
+use super::settings::{Fidelity, SolverSettings};
 use crate::error::DeformableBodyError;
+use crate::fem::{Build, DeformableModel};
 use crate::material::DeformableMaterial;
 use crate::mesh::{MeshError, Structure, TetMesh};
 use parry3d::shape::Shape;

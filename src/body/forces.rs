@@ -1,6 +1,7 @@
 //! Forces and impulses on vertices.
 
-use super::body::{BodyError, DeformableBody, finite};
+use super::body::{DeformableBody, finite};
+use crate::error::BodyError;
 use crate::math::Vec3;
 use rapier3d::math::Vector;
 

@@ -1,40 +1,43 @@
-//! Deformable bodies: what is constant ([`DeformableModel`]), what a snapshot holds
-//! ([`DeformableState`]), and what a user sets ([`DeformableBody`]).
+//! Deformable bodies as users touch them: what is constant is a [`DeformableModel`](crate::DeformableModel), what a
+//! snapshot holds a [`DeformableState`], what a user sets a [`DeformableBody`].
 //!
 //! Architecture invariant: vertex indices at the surface of this module are the user's; inside,
-//! nodes are renumbered for locality, and only `DeformableModel` translates.
+//! nodes are renumbered for locality, and only the model translates.
 
-mod attachment;
+mod constraint_memory;
+mod handle;
+mod settings;
+mod state;
+
 #[allow(clippy::module_inception)]
 mod body;
-mod builder;
-pub(crate) mod constant;
+
 mod controls;
-pub(crate) mod elastic;
-mod elements;
 mod forces;
-mod model;
 mod motion;
-pub(crate) mod patches;
 mod pins;
 mod report;
-mod set;
-mod settings;
 mod sleep;
-mod state;
-pub(crate) mod tangent;
-mod thin;
 
-pub(crate) use attachment::{Anchors, Hold};
-pub use attachment::{AttachTo, DeformableAttachment, DeformableAttachmentHandle};
-pub use body::{BodyError, DeformableBody};
+mod builder;
+
+mod attachment;
+mod set;
+
+mod attach;
+
+pub(crate) use attachment::{Anchors, PrescribedNode};
+pub use attachment::{AttachTo, DeformableAttachment};
+pub use body::{DeformableBody, Pin};
 pub use builder::DeformableBodyBuilder;
-pub use model::DeformableModel;
-pub use pins::Pin;
-pub use set::{DeformableBodyHandle, DeformableBodySet};
-pub use settings::{
-    Acceleration, FactorPrecision, Fidelity, Frames, Integrator, Solver, SolverSettings, SystemMatrix,
+pub use constraint_memory::JointRole;
+pub(crate) use constraint_memory::{
+    AttachmentAxis, AttachmentDirection, ConstraintGeometry, ConstraintKey, ConstraintMemory, Feature,
+    JointAxis, ObstacleContact, RigidPairContact, SoftPairContact, SoftPairKind,
 };
-pub(crate) use sleep::{Surroundings, TIME_UNTIL_SLEEP};
+pub use handle::{DeformableAttachmentHandle, DeformableBodyHandle};
+pub use set::DeformableBodySet;
+pub use settings::{Acceleration, FactorPrecision, Fidelity, Frames, Integrator, Solver, SolverSettings};
+pub(crate) use sleep::TIME_UNTIL_SLEEP;
 pub use state::DeformableState;
-pub(crate) use state::{ContactGeometry, ContactKey, ContactMemory, FIRST_LINK_SLOT, SOFT_SLOT, is_number};
+pub(crate) use state::{Surroundings, is_number};

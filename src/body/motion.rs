@@ -1,7 +1,8 @@
 //! Mass, momentum and energy of a body, and setting it in motion.
 
-use super::body::{BodyError, DeformableBody, finite};
-use super::elastic;
+use super::body::{DeformableBody, finite};
+use crate::error::BodyError;
+use crate::fem::elastic_forces;
 use crate::math::{Pose64, Vec3, to_real};
 use rapier3d::math::{Pose, Vector};
 
@@ -48,10 +49,10 @@ impl DeformableBody {
     /// Elastic energy \[J\].
     pub fn elastic_energy(&self) -> f64 {
         let mut unused = vec![Vec3::zeros(); self.state.x.len()];
-        let undamped = elastic::StiffnessDamping::default();
+        let undamped = elastic_forces::StiffnessDamping::default();
         let frame = crate::math::Mat3::identity();
         let x = &self.state.x;
-        elastic::add_forces(&self.elements(), &undamped, x, &frame, f64::INFINITY, &mut unused).energy
+        elastic_forces::add_forces(&self.elements(), &undamped, x, &frame, f64::INFINITY, &mut unused).energy
     }
 
     /// Sets the velocity of all vertices [m/s].
@@ -122,7 +123,7 @@ impl DeformableBody {
         self.state.v.iter_mut().for_each(|v| *v = pose.rotation * *v);
         self.pins.iter_mut().for_each(|p| p.target = pose.transform(&p.target));
         self.state.contacts.clear();
-        self.state.closure.clear();
+        self.state.shared.clear();
         Ok(())
     }
 }

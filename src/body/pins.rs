@@ -1,17 +1,9 @@
 //! Vertices that are held, or led along.
 
-use super::body::{BodyError, DeformableBody, finite};
+use super::body::{DeformableBody, Pin, finite};
+use crate::error::BodyError;
 use crate::math::Vec3;
 use rapier3d::math::Vector;
-
-/// A vertex held in place, or led along by its user.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pin {
-    pub(crate) node: u32,
-    pub(crate) target: Vec3,
-    /// Force that holds the vertex \[N\], of the last step.
-    pub(crate) force: Vec3,
-}
 
 impl DeformableBody {
     /// Holds a vertex where it is.

@@ -2,17 +2,6 @@
 
 use super::body::DeformableBody;
 
-/// How the last step of a body went.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct StepReport {
-    pub iterations: usize,
-    pub residual: f64,
-    pub tolerance: f64,
-    pub guard_retries: usize,
-    pub gave_up: bool,
-    pub quarantined: bool,
-}
-
 impl DeformableBody {
     /// Global iterations of the last step.
     pub fn last_iterations(&self) -> usize {
@@ -32,8 +21,8 @@ impl DeformableBody {
     /// Whether the last step was given up: what was found of it would have made energy, as where a body is pinched to a
     /// film, or strained it by what it ran into. The body has kept its shape and moved as a rigid one; a pinned
     /// one has stayed where it was.
-    pub fn last_gave_up(&self) -> bool {
-        self.report.gave_up
+    pub fn last_step_rejected(&self) -> bool {
+        self.report.is_rejected
     }
 
     /// How often the last step had to be done again because it would have raised the energy: without the quasi-Newton

@@ -1,30 +1,14 @@
 //! The set of all bodies of a world.
 
-use super::attachment::{DeformableAttachment, DeformableAttachmentHandle};
+use super::attachment::DeformableAttachment;
 use super::body::DeformableBody;
 use super::builder::DeformableBodyBuilder;
-use crate::error::{DeformableBodyError, HandleError};
+use super::handle::{DeformableAttachmentHandle, DeformableBodyHandle};
+use crate::error::DeformableBodyError;
 use crate::math::Vec3;
-use rapier3d::data::arena::{Arena, Index};
+use rapier3d::data::arena::Arena;
 use std::collections::BTreeMap;
 use std::ops::{Index as At, IndexMut as AtMut};
-
-/// Names a body of a [`DeformableBodySet`]. Generational: a handle of a removed body never names
-/// its successor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct DeformableBodyHandle(Index);
-
-impl DeformableBodyHandle {
-    /// Slot and generation.
-    pub fn into_raw_parts(self) -> (u32, u32) {
-        self.0.into_raw_parts()
-    }
-
-    pub(crate) fn no_such_body(self) -> HandleError {
-        let (index, generation) = self.into_raw_parts();
-        HandleError::NoSuchBody { index, generation }
-    }
-}
 
 /// All deformable bodies of a world.
 #[derive(Clone, Debug, Default)]

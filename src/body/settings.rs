@@ -1,5 +1,7 @@
 //! The knobs that trade speed for accuracy, per body.
 
+use crate::fem::{Build, SystemMatrix};
+
 /// How the matrix of a body's step is answered. All have the same energy, guard, contact and coupling, and
 /// iterated they all come to the same motion; they differ in what an iteration costs and gains.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -21,21 +23,6 @@ pub enum Solver {
     /// Newton's method: the second derivatives of the energy itself, factored anew in every iteration. The
     /// reference, and right for ropes and stiff cloth.
     Newton,
-}
-
-/// The constant matrix of the global step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum SystemMatrix {
-    /// `M/h² + K₀` with the linear stiffness K₀ of the rest shape, 3n×3n, applied in rotating
-    /// [`Frames`]. The default: stiff bodies are right at one
-    /// iteration, bending ones at five to ten.
-    #[default]
-    RestStiffness,
-    /// `M/h² + Σ w V GᵀG`, the n×n matrix of classical Projective Dynamics [Bouaziz et al. 2014].
-    /// A ninth of the factor, but resists rotation: stiff bodies turn and bend too slowly unless
-    /// iterated. For previews and very large bodies.
-    Laplacian,
 }
 
 /// In which rotating frames the rest stiffness is applied.
@@ -129,17 +116,6 @@ pub enum Fidelity {
     Engineering,
     /// [`Solver::Newton`] until little but rounding is left.
     Reference,
-}
-
-/// What a body is made of, as far as settings depend on it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Build {
-    /// Tetrahedra, with or without anything else.
-    Solid,
-    /// Sheets or springs.
-    Sheet,
-    /// Nothing but rods.
-    Rope,
 }
 
 impl Build {

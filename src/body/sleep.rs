@@ -1,40 +1,13 @@
 //! Bodies that lie still for a while are not stepped until something about them changes.
 
 use super::body::DeformableBody;
-use super::set::DeformableBodyHandle;
-use crate::math::{Pose64, Vec3};
+use super::state::{Sleep, Surroundings};
+use crate::math::Vec3;
 
 /// Speed [m/s] below which a vertex counts as still.
 pub(crate) const STILL_SPEED: f64 = 0.01;
 /// Time \[s\] after which a still body falls asleep, with all that it touches. Rapier's.
 pub(crate) const TIME_UNTIL_SLEEP: f64 = 0.5;
-
-/// How a body sleeps, or how far it is from that.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Sleep {
-    /// Time \[s\] for which the body has been still.
-    pub still_for: f64,
-    pub surroundings: Option<Surroundings>,
-}
-
-/// What was around a body when it fell asleep: whatever differs wakes it.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Surroundings {
-    /// Key, part, and pose of the obstacles near it.
-    pub obstacles: Vec<(u64, u32, Pose64)>,
-    /// The next of the bodies that fell asleep together, because they touched, in a ring.
-    pub mate: Option<DeformableBodyHandle>,
-    pub gravity: Vec3,
-    /// Length of the step \[s\].
-    pub dt: f64,
-}
-
-impl Surroundings {
-    /// Whether the things around are those of another time.
-    pub fn is_around(&self, other: &Self) -> bool {
-        self.obstacles == other.obstacles && self.gravity == other.gravity && self.dt == other.dt
-    }
-}
 
 impl DeformableBody {
     /// Whether the body sleeps: it lay still for half a second, as did all that it touches, and is not

@@ -1,7 +1,7 @@
 //! Which obstacles come near a body: a bounding volume hierarchy over what stands still, a list of
 //! what moves.
 
-use super::Obstacle;
+use super::obstacle::Obstacle;
 use crate::math::{Vec3, to_real};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::partitioning::{Bvh, BvhBuildStrategy};
@@ -87,7 +87,7 @@ impl Candidates {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::PartnerId;
+    use crate::contact::ProxyId;
     use crate::math::{Mat3, Pose64};
     use parry3d::math::Vector;
     use parry3d::shape::SharedShape;
@@ -104,7 +104,7 @@ mod tests {
                 let mut end = start;
                 end.translation.x += if moves { 0.5 } else { 0.0 };
                 let shape = if i == 7 { SharedShape::halfspace(Vector::Y) } else { SharedShape::ball(0.3) };
-                Obstacle { partner: PartnerId(i as u32), key: i as u64, part: 0, shape, start, end }
+                Obstacle { proxy: ProxyId(i as u32), key: i as u64, part: 0, shape, start, end }
             }).collect();
             let mut candidates = Candidates::default();
             candidates.update(&obstacles);

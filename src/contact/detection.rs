@@ -1,12 +1,13 @@
 //! Contacts of one body with one obstacle.
 
+use super::constraint::{Constraint, Endpoint, Law};
 use super::obstacle::Obstacle;
-use super::rim_rows::{corner_on_triangle, corners_in, rim_crossing};
-use super::row::{Law, Row, Side};
+use super::rim_contact::{corner_on_triangle, corners_in, rim_crossing};
 use super::surface_point::{Scales, SurfacePoint, surface_point};
-use super::thin::{looks_away, segment_point, side_of_node};
-use super::triangle_rows::triangle_point;
-use crate::body::{ContactKey, ContactMemory, DeformableModel};
+use super::thin_contact::{looks_away, segment_point, side_of_node};
+use super::triangle_contact::triangle_point;
+use crate::body::{ConstraintKey, ConstraintMemory, Feature, ObstacleContact};
+use crate::fem::DeformableModel;
 use crate::math::{Vec3, from_real, to_real};
 use crate::mesh::NONE;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
@@ -47,8 +48,8 @@ pub(crate) struct Detector {
     /// Corners of the obstacle, and which triangle each stands on.
     corners: Vec<(u32, Vec3)>,
     standing: Vec<(usize, SurfacePoint)>,
-    /// Closest points, kept from the last step and new: feature, slot, row.
-    points: Vec<(u32, u32, SurfacePoint)>,
+    /// Closest points, kept from the last step and new: feature, slot, constraint.
+    points: Vec<(Feature, u32, SurfacePoint)>,
 }
 
 /// One call's arguments, shared by its parts.
@@ -99,7 +100,7 @@ impl Detector {
         Aabb::from_points(points).loosened(reach as f32)
     }
 
-    /// Appends the contacts of a pair to `rows`; `memory` holds those of the last step that carried.
+    /// Appends the contacts of a pair to `constraints`; `memory` holds those of the last step that carried.
     /// [`Detector::begin`] was called for the body.
     pub fn detect(
         &mut self,
@@ -107,10 +108,10 @@ impl Detector {
         obstacle: &Obstacle,
         model: &DeformableModel,
         x: &[Vec3],
-        memory: &[ContactMemory],
-        rows: &mut Vec<Row>,
+        memory: &[ConstraintMemory],
+        constraints: &mut Vec<Constraint>,
     ) {
-        let first = rows.len();
+        let first = constraints.len();
         let surface = &model.surface;
         let to_local = |n: &u32| obstacle.start.inverse_transform(&x[*n as usize]);
         self.local.clear();
@@ -125,21 +126,26 @@ impl Detector {
             scales: Scales { band: BAND * model.size, shift: SHIFT * surface.mean_edge },
             motion: if moves { surface.nodes.iter().map(motion).fold(0.0, f64::max) } else { 0.0 },
         };
-        self.detect_nodes(&scene, memory, rows);
+        self.detect_nodes(&scene, memory, constraints);
         if !obstacle.is_half_space() {
-            self.detect_rims(&scene, rows);
-            self.detect_corners(&scene, rows);
-            self.keep_points(&scene, memory, rows);
-            self.detect_triangles(&scene, rows);
-            self.detect_segments(&scene, rows);
+            self.detect_rims(&scene, constraints);
+            self.detect_corners(&scene, constraints);
+            self.keep_points(&scene, memory, constraints);
+            self.detect_triangles(&scene, constraints);
+            self.detect_segments(&scene, constraints);
         }
         if obstacle.is_faceted() {
-            one_row_per_feature(rows, first);
+            one_constraint_per_feature(constraints, first);
         }
-        rows[first..].sort_unstable_by_key(|r| r.key);
+        constraints[first..].sort_unstable_by_key(|r| r.key);
     }
 
-    fn detect_nodes(&mut self, scene: &Scene<'_>, memory: &[ContactMemory], rows: &mut Vec<Row>) {
+    fn detect_nodes(
+        &mut self,
+        scene: &Scene<'_>,
+        memory: &[ConstraintMemory],
+        constraints: &mut Vec<Constraint>,
+    ) {
         let surface = &scene.model.surface;
         let nodes = &surface.nodes;
         self.nodes.clear();
@@ -165,12 +171,17 @@ impl Detector {
             };
             self.nodes[s] = surface_point(scene.obstacle, &p, &outward, &scene.scales);
             if let Some(found) = self.nodes[s].filter(|f| f.gap < reach) {
-                rows.push(scene.row([nodes[s], 0, 0], [1.0, 0.0, 0.0], &found, nodes[s]));
+                constraints.push(scene.constraint(
+                    [nodes[s], 0, 0],
+                    [1.0, 0.0, 0.0],
+                    &found,
+                    (Feature::Node(nodes[s]), 0),
+                ));
             }
         }
     }
 
-    fn detect_rims(&mut self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
+    fn detect_rims(&mut self, scene: &Scene<'_>, constraints: &mut Vec<Constraint>) {
         let surface = &scene.model.surface;
         self.edges.clear();
         self.edges.resize(surface.edges.len(), None);
@@ -198,13 +209,18 @@ impl Detector {
             let found = crossings.min_by(|a, b| a.1.gap.total_cmp(&b.1.gap));
             if let Some((t, found)) = found.filter(|(_, found)| found.gap < reach) {
                 let nodes = [edge[0], edge[1], 0];
-                rows.push(scene.row(nodes, [1.0 - t, t, 0.0], &found, scene.edge_feature(e)));
+                constraints.push(scene.constraint(
+                    nodes,
+                    [1.0 - t, t, 0.0],
+                    &found,
+                    (Feature::Edge(e as u32), 0),
+                ));
                 self.edges[e] = Some(found);
             }
         }
     }
 
-    fn detect_corners(&mut self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
+    fn detect_corners(&mut self, scene: &Scene<'_>, constraints: &mut Vec<Constraint>) {
         let surface = &scene.model.surface;
         let reach = self.reach.iter().fold(0.0, |a: f64, b| a.max(*b)) + scene.motion;
         let body = Aabb::from_points(self.local.iter().map(to_real)).loosened(reach as f32);
@@ -223,18 +239,18 @@ impl Detector {
                 let [a, b, c] = corners;
                 let corners = if turned { [a, c, b] } else { corners };
                 let found = corner_on_triangle(scene.obstacle, corner, &corners, reach, &scene.scales);
-                let Some((mut weights, row)) = found else { continue };
+                let Some((mut weights, constraint)) = found else { continue };
                 if turned {
                     weights.swap(1, 2);
                 }
-                if best.is_none_or(|(_, _, b)| row.gap.abs() < b.gap.abs()) {
-                    best = Some((t, weights, row));
+                if best.is_none_or(|(_, _, b)| constraint.gap.abs() < b.gap.abs()) {
+                    best = Some((t, weights, constraint));
                 }
             }
             if let Some((t, weights, found)) = best {
                 self.standing.push((t, found));
-                let feature = scene.corner_feature(*number);
-                rows.push(scene.row(surface.triangles[t], weights, &found, feature));
+                let feature = Feature::Corner(*number);
+                constraints.push(scene.constraint(surface.triangles[t], weights, &found, (feature, 0)));
             }
         }
     }
@@ -244,12 +260,20 @@ impl Detector {
     /// point, the next one is elsewhere, and without memory the two would take turns for ever. Rows with
     /// shapes of plane faces have no slots, and so none is kept: beside an edge the normal of a face is not
     /// the one of the contact.
-    fn keep_points(&mut self, scene: &Scene<'_>, memory: &[ContactMemory], rows: &mut Vec<Row>) {
+    fn keep_points(
+        &mut self,
+        scene: &Scene<'_>,
+        memory: &[ConstraintMemory],
+        constraints: &mut Vec<Constraint>,
+    ) {
         let surface = &scene.model.surface;
         self.points.clear();
-        let carried =
-            |m: &&ContactMemory| m.key.slot >= FIRST_POINT && !m.key.is_between() && m.force != Vec3::zeros();
-        for kept in memory.iter().filter(carried) {
+        let carried = memory.iter().filter(|m| m.force != Vec3::zeros());
+        for kept in carried {
+            let ConstraintKey::Obstacle(contact) = kept.key else { continue };
+            if contact.slot < FIRST_POINT {
+                continue;
+            }
             let (nodes, weights) = (kept.geometry.nodes[0], kept.geometry.weights[0]);
             let s = nodes.map(|n| surface.index_of_node[n as usize] as usize);
             // A restored state may be another mesh's.
@@ -265,15 +289,13 @@ impl Detector {
             let reach = s.iter().fold(0.0, |a: f64, &s| a.max(self.reach[s])) + scene.motion;
             let found = surface_point(scene.obstacle, &p, &outward, &scene.scales);
             if let Some(found) = found.filter(|f| f.gap < reach && f.normal.dot(&outward) < 0.0) {
-                self.points.push((kept.key.feature, kept.key.slot, found));
-                let mut row = scene.row(nodes, weights, &found, kept.key.feature);
-                row.key.slot = kept.key.slot;
-                rows.push(row);
+                self.points.push((contact.feature, contact.slot, found));
+                constraints.push(scene.constraint(nodes, weights, &found, (contact.feature, contact.slot)));
             }
         }
     }
 
-    fn detect_triangles(&mut self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
+    fn detect_triangles(&mut self, scene: &Scene<'_>, constraints: &mut Vec<Constraint>) {
         let surface = &scene.model.surface;
         for (t, triangle) in surface.triangles.iter().enumerate() {
             let s = triangle.map(|n| surface.index_of_node[n as usize] as usize);
@@ -284,10 +306,10 @@ impl Detector {
                 continue;
             }
             let edges = surface.triangle_edges[t].map(|e| &self.edges[e as usize]);
-            let standing = self.standing.iter().filter(|(on, _)| *on == t).map(|(_, row)| row);
+            let standing = self.standing.iter().filter(|(on, _)| *on == t).map(|(_, constraint)| constraint);
             let known = s.iter().filter_map(|&s| self.nodes[s].as_ref());
-            let [e0, e1, e2] = surface.triangle_edges[t].map(|e| scene.edge_feature(e as usize));
-            let own = [e0, e1, e2, scene.triangle_feature(t)];
+            let [e0, e1, e2] = surface.triangle_edges[t].map(Feature::Edge);
+            let own = [e0, e1, e2, Feature::Triangle(t as u32)];
             let points = self.points.iter().filter(|(feature, ..)| own.contains(feature)).map(|p| &p.2);
             let known = known.chain(edges.into_iter().flatten()).chain(standing).chain(points);
             let turned = t >= surface.closed && self.looks_away(scene, triangle, &corners);
@@ -297,22 +319,20 @@ impl Detector {
                     hit.weights.swap(1, 2);
                 }
                 let feature = match hit.weights.iter().position(|w| *w == 0.0) {
-                    Some(opposite) => scene.edge_feature(surface.triangle_edges[t][opposite] as usize),
-                    None => scene.triangle_feature(t),
+                    Some(opposite) => Feature::Edge(surface.triangle_edges[t][opposite]),
+                    None => Feature::Triangle(t as u32),
                 };
                 let slot = self.free_slot(feature);
                 self.points.push((feature, slot, hit.surface));
-                let mut row = scene.row(*triangle, hit.weights, &hit.surface, feature);
-                row.key.slot = slot;
-                rows.push(row);
+                constraints.push(scene.constraint(*triangle, hit.weights, &hit.surface, (feature, slot)));
             }
         }
     }
 
     /// Contacts inside the segments of rods.
-    fn detect_segments(&mut self, scene: &Scene<'_>, rows: &mut Vec<Row>) {
+    fn detect_segments(&mut self, scene: &Scene<'_>, constraints: &mut Vec<Constraint>) {
         let surface = &scene.model.surface;
-        let alone = surface.edge_triangles.iter().enumerate().filter(|(_, sides)| sides[0] == NONE);
+        let alone = surface.edge_triangles.iter().enumerate().filter(|(_, endpoints)| endpoints[0] == NONE);
         for (e, _) in alone {
             let s = surface.edges[e].map(|n| surface.index_of_node[n as usize] as usize);
             let ends = s.map(|s| self.local[s]);
@@ -321,7 +341,7 @@ impl Detector {
             if !around.intersects(&scene.extent) {
                 continue;
             }
-            let feature = scene.edge_feature(e);
+            let feature = Feature::Edge(e as u32);
             let skin =
                 surface.edges[e].iter().map(|&n| scene.model.half_thickness[n as usize]).fold(0.0, f64::max);
             let points = self.points.iter().filter(|p| p.0 == feature).map(|p| &p.2);
@@ -329,15 +349,14 @@ impl Detector {
             if let Some((t, found)) = segment_point(scene.obstacle, &ends, known, reach, skin, &scene.scales)
             {
                 let [a, b] = surface.edges[e];
-                let mut row = scene.row([a, b, a], [1.0 - t, t, 0.0], &found, feature);
-                row.key.slot = self.free_slot(feature);
-                rows.push(row);
+                let name = (feature, self.free_slot(feature));
+                constraints.push(scene.constraint([a, b, a], [1.0 - t, t, 0.0], &found, name));
             }
         }
     }
 
     /// The first slot of a feature that no closest point has yet.
-    fn free_slot(&self, feature: u32) -> u32 {
+    fn free_slot(&self, feature: Feature) -> u32 {
         let taken = |slot: u32| self.points.iter().any(|p| (p.0, p.1) == (feature, slot));
         (FIRST_POINT..).find(|&slot| !taken(slot)).unwrap_or(FIRST_POINT)
     }
@@ -371,31 +390,27 @@ impl Detector {
 }
 
 impl Scene<'_> {
-    fn edge_feature(&self, edge: usize) -> u32 {
-        (self.model.rest.len() + edge) as u32
-    }
-
-    fn triangle_feature(&self, triangle: usize) -> u32 {
-        self.edge_feature(self.model.surface.edges.len() + triangle)
-    }
-
-    fn corner_feature(&self, corner: u32) -> u32 {
-        self.triangle_feature(self.model.surface.triangles.len()) + corner
-    }
-
-    fn row(&self, nodes: [u32; 3], weights: [f64; 3], found: &SurfacePoint, feature: u32) -> Row {
+    /// The constraint of a point; its name is a feature and a slot. With plane faces one per feature is kept.
+    fn constraint(
+        &self,
+        nodes: [u32; 3],
+        weights: [f64; 3],
+        found: &SurfacePoint,
+        (feature, slot): (Feature, u32),
+    ) -> Constraint {
         let obstacle = self.obstacle;
-        let soft = Side::Soft { body: self.pair.body, nodes, weights };
-        let partner =
-            Side::Partner { partner: obstacle.partner, point: obstacle.start.transform(&found.point) };
-        let key = ContactKey { obstacle: obstacle.key, part: obstacle.part, feature, slot: 0 };
+        let soft = Endpoint::Soft { body: self.pair.body, nodes, weights };
+        let proxy = Endpoint::Rigid { proxy: obstacle.proxy, point: obstacle.start.transform(&found.point) };
+        let slot = if obstacle.is_faceted() { 0 } else { slot };
+        let key = ObstacleContact { collider: obstacle.key, part: obstacle.part, feature, slot };
+        let key = ConstraintKey::Obstacle(key);
         let normal = obstacle.start.rotation * found.normal;
         let skin = nodes.iter().zip(weights).map(|(&n, w)| self.model.half_thickness[n as usize] * w);
         let gap = found.gap - skin.sum::<f64>();
-        let mut row = Row::new([soft, partner], normal.normalize(), gap, key);
-        row.law = Law::Contact { friction: self.pair.friction };
-        row.restitution = self.pair.restitution;
-        row
+        let mut constraint = Constraint::new([soft, proxy], normal.normalize(), gap, key);
+        constraint.law = Law::Contact { friction: self.pair.friction };
+        constraint.restitution = self.pair.restitution;
+        constraint
     }
 }
 
@@ -405,16 +420,15 @@ fn near(extent: &Aabb, p: &Vec3, reach: f64) -> bool {
     (0..3).all(|k| p[k] >= low[k] - reach && p[k] <= high[k] + reach)
 }
 
-/// Of the rows from `first` on that name one feature, the deepest stays.
-fn one_row_per_feature(rows: &mut Vec<Row>, first: usize) {
-    rows[first..].iter_mut().for_each(|r| r.key.slot = 0);
-    rows[first..].sort_unstable_by(|a, b| a.key.cmp(&b.key).then(a.gap.total_cmp(&b.gap)));
+/// Of the constraints from `first` on that name one feature, the deepest stays.
+fn one_constraint_per_feature(constraints: &mut Vec<Constraint>, first: usize) {
+    constraints[first..].sort_unstable_by(|a, b| a.key.cmp(&b.key).then(a.gap.total_cmp(&b.gap)));
     let mut kept = first;
-    for i in first..rows.len() {
-        if kept == first || rows[kept - 1].key != rows[i].key {
-            rows.swap(kept, i);
+    for i in first..constraints.len() {
+        if kept == first || constraints[kept - 1].key != constraints[i].key {
+            constraints.swap(kept, i);
             kept += 1;
         }
     }
-    rows.truncate(kept);
+    constraints.truncate(kept);
 }

@@ -1,30 +1,41 @@
-//! Where bodies touch obstacles: candidates, closest features, rows, and the friction cone.
+//! Where bodies touch: obstacles, candidates, closest features, constraints.
 //!
 //! Architecture invariant: the only room that names parry's queries, and it knows no rapier sets:
 //! `coupling` fills the [`Obstacle`]s.
 
-mod approach;
-mod between;
-mod candidates;
-pub(crate) mod cone;
-mod crossing;
-pub(crate) mod crossing_nodes;
-mod detection;
+mod constraint;
 mod obstacle;
-mod queries;
-mod rim_rows;
-mod row;
-mod surface_point;
-mod surface_tree;
-mod tangle;
-mod thin;
-mod triangle_rows;
 
-pub(crate) use approach::{MeetingPoint, meeting_points, placed};
-pub(crate) use between::{BetweenDetector, SoftPair, SoftSurface};
+mod candidates;
+mod surface_point;
+
+mod rim_contact;
+mod thin_contact;
+mod triangle_contact;
+
+mod detection;
+
+mod surface_tree;
+
+mod soft_surface;
+
+mod edge_contact;
+mod tangle;
+
+mod soft_contact;
+
+mod speculative;
+mod tunnelling_stop;
+
+mod queries;
+
 pub(crate) use candidates::Candidates;
+pub(crate) use constraint::{Constraint, Endpoint, Law};
 pub(crate) use detection::{Detector, Pair, STATIC_MARGIN};
-pub(crate) use obstacle::{Obstacle, PartnerId};
+pub(crate) use obstacle::{Obstacle, ProxyId};
 pub use queries::DeformableSurfacePoint;
-pub(crate) use row::{Law, Row, Side};
+pub(crate) use soft_contact::SoftDetector;
+pub(crate) use soft_surface::{SoftPair, SoftSurface};
+pub(crate) use speculative::{SpeculativePoint, placed, speculative_points};
 pub(crate) use surface_tree::SurfaceTree;
+pub(crate) use tunnelling_stop::{Stop, comes_near, stop};

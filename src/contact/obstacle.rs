@@ -6,12 +6,12 @@ use parry3d::shape::{SharedShape, TypedShape};
 
 /// Names a rigid body (or a collider without one) within a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) struct PartnerId(pub u32);
+pub(crate) struct ProxyId(pub u32);
 
 /// One collider, with the motion it makes over the step if nothing touches it.
 #[derive(Clone)]
 pub(crate) struct Obstacle {
-    pub partner: PartnerId,
+    pub proxy: ProxyId,
     /// Names the collider over several steps.
     pub key: u64,
     /// Part of a compound.

@@ -1,6 +1,6 @@
 //! What a game picks and a robot senses: rays, points and shapes against the surfaces of deformable bodies.
 
-use super::triangle_rows::barycentric;
+use super::triangle_contact::barycentric;
 use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet};
 use crate::math::{Vec3, from_real, to_real};
 use crate::mesh::tetrahedron_holds;

@@ -185,7 +185,7 @@ impl Projection {
         let gap = normal.dot(&(p - self.point));
         let flat = self.face.is_some_and(|n| n == normal || n == -normal);
         // On a plane face the point is the foot of p: what was projected may have been shifted, and forces
-        // at different points would turn the two sides against each other.
+        // at different points would turn the two endpoints against each other.
         let point = if flat { p - normal * gap } else { self.point };
         SurfacePoint { point, normal, gap, flat }
     }
@@ -194,14 +194,14 @@ impl Projection {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::PartnerId;
+    use crate::contact::ProxyId;
     use crate::math::{Mat3, Pose64};
     use parry3d::math::Vector;
     use parry3d::shape::SharedShape;
 
     fn obstacle(shape: SharedShape) -> Obstacle {
         let start = Pose64 { rotation: Mat3::identity(), translation: Vec3::zeros() };
-        Obstacle { partner: PartnerId(0), key: 0, part: 0, shape, start, end: start }
+        Obstacle { proxy: ProxyId(0), key: 0, part: 0, shape, start, end: start }
     }
 
     const SCALES: Scales = Scales { band: 4e-5, shift: 0.01 };

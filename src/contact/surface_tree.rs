@@ -1,7 +1,7 @@
 //! Which facets of two surfaces, triangles and segments of rods, may meet within a step: trees over the boxes that they sweep,
 //! refitted from step to step.
 
-use crate::body::DeformableModel;
+use crate::fem::DeformableModel;
 use crate::math::{Vec3, to_real};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::partitioning::{Bvh, BvhBuildStrategy};

@@ -2,26 +2,28 @@
 //! are drawn apart along the line between their middles, and parts of one body along that between the middles of
 //! what is around the triangles that cut one another.
 
-use super::between::{SoftSurface, near_in_mesh};
-use super::row::{Row, Side};
-use crate::body::{ContactKey, SOFT_SLOT};
+use super::constraint::{Constraint, Endpoint};
+use super::soft_surface::{SoftSurface, near_in_mesh};
+use crate::body::{ConstraintKey, SoftPairContact, SoftPairKind};
 use crate::math::{Vec3, to_real};
 use crate::mesh::tetrahedron_holds;
 use parry3d::math::Pose;
 use parry3d::query::{PointQuery, intersection_test};
 use parry3d::shape::Triangle;
 
-/// Slot of the rows that draw bodies apart.
-const SLOT: u32 = SOFT_SLOT + 3;
 /// Depth, in mean edges, of a node in the other body from which on the two are tangled.
 const DEEP: f64 = 0.5;
 /// Height, in mean edges, from which on a corner is on one side of a plane, and not in it.
 const CLEARLY: f64 = 0.1;
 
-/// Appends rows that draw apart what is tangled, as fast as overlaps are recovered, on triangles that go through one
+/// Appends constraints that draw apart what is tangled, as fast as overlaps are recovered, on triangles that go through one
 /// another; `pairs` are triangles whose boxes meet.
-pub(super) fn untangle([a, b]: [&SoftSurface<'_>; 2], pairs: &[(u32, u32)], rows: &mut Vec<Row>) {
-    let first = rows.len();
+pub(super) fn untangle(
+    [a, b]: [&SoftSurface<'_>; 2],
+    pairs: &[(u32, u32)],
+    constraints: &mut Vec<Constraint>,
+) {
+    let first = constraints.len();
     let middle = |s: &SoftSurface<'_>| s.x.iter().sum::<Vec3>() / s.x.len() as f64;
     let is_same_place = is_same_place(a, b);
     // Bodies in the very same place part in any direction.
@@ -34,9 +36,9 @@ pub(super) fn untangle([a, b]: [&SoftSurface<'_>; 2], pairs: &[(u32, u32)], rows
             is_deep.then(|| (middle(a) - middle(b)).try_normalize(0.0).unwrap_or_else(Vec3::y))
         });
         let Some(apart) = apart else { return };
-        rows.push(row(a, ta, b, tb, apart));
+        constraints.push(constraint(a, ta, b, tb, apart));
     }
-    rows[first..].sort_unstable_by_key(|row| row.key);
+    constraints[first..].sort_unstable_by_key(|constraint| constraint.key);
 }
 
 /// Whether two bodies of one mesh are node on node: their triangles touch all over, and none goes through another.
@@ -46,15 +48,15 @@ fn is_same_place(a: &SoftSurface<'_>, b: &SoftSurface<'_>) -> bool {
     a.x.len() == b.x.len() && a.x.iter().zip(b.x).all(is_near)
 }
 
-/// As [`untangle`], of a body with itself. Other contacts between the same parts, of the rows from `first` on, would
+/// As [`untangle`], of a body with itself. Other contacts between the same parts, of the constraints from `first` on, would
 /// hold them where they are.
 pub(super) fn untangle_itself(
     own: &SoftSurface<'_>,
     pairs: &[(u32, u32)],
     first: usize,
-    rows: &mut Vec<Row>,
+    constraints: &mut Vec<Constraint>,
 ) {
-    let mut apart_rows = Vec::new();
+    let mut separating = Vec::new();
     let triangle = |t: u32| own.model.surface.triangles[t as usize];
     for (ta, tb) in pairs.iter().copied().filter(|(ta, tb)| ta < tb) {
         let near = |a: u32| triangle(tb).iter().any(|&b| near_in_mesh(own.model, a, b));
@@ -69,18 +71,18 @@ pub(super) fn untangle_itself(
         }
         // Parts in the very same place part in any direction.
         let apart = (parts[0].middle - parts[1].middle).try_normalize(0.0).unwrap_or_else(Vec3::y);
-        apart_rows.push(row(own, ta, own, tb, apart));
+        separating.push(constraint(own, ta, own, tb, apart));
         let mut place = 0;
-        rows.retain(|row| {
+        constraints.retain(|constraint| {
             place += 1;
-            let within = |part: &Part, side: &Side| side.soft_nodes().all(|(n, _)| part.holds(n as u32));
-            let [a, b] = &row.sides;
+            let within = |part: &Part, side: &Endpoint| side.soft_nodes().all(|(n, _)| part.holds(n as u32));
+            let [a, b] = &constraint.endpoints;
             let between = |p: &Part, q: &Part| within(p, a) && within(q, b);
             place <= first || !(between(&parts[0], &parts[1]) || between(&parts[1], &parts[0]))
         });
     }
-    apart_rows.sort_unstable_by_key(|row| row.key);
-    rows.append(&mut apart_rows);
+    separating.sort_unstable_by_key(|constraint| constraint.key);
+    constraints.append(&mut separating);
 }
 
 /// What of a body is around a triangle of its surface.
@@ -131,14 +133,15 @@ impl Part {
 }
 
 /// What draws two triangles apart.
-fn row(a: &SoftSurface<'_>, ta: u32, b: &SoftSurface<'_>, tb: u32, apart: Vec3) -> Row {
+fn constraint(a: &SoftSurface<'_>, ta: u32, b: &SoftSurface<'_>, tb: u32, apart: Vec3) -> Constraint {
     let side = |s: &SoftSurface<'_>, t: u32| {
         let nodes = s.model.surface.triangles[t as usize];
-        Side::Soft { body: s.body, nodes, weights: [1.0 / 3.0; 3] }
+        Endpoint::Soft { body: s.body, nodes, weights: [1.0 / 3.0; 3] }
     };
-    let key = ContactKey { obstacle: b.key, part: tb, feature: ta, slot: SLOT };
+    let key = SoftPairContact { other: b.key, second: tb, first: ta, kind: SoftPairKind::Separation };
+    let key = ConstraintKey::SoftPair(key);
     let depth = a.model.surface.mean_edge.min(b.model.surface.mean_edge);
-    Row::new([side(a, ta), side(b, tb)], apart, -depth, key)
+    Constraint::new([side(a, ta), side(b, tb)], apart, -depth, key)
 }
 
 fn distance(s: &SoftSurface<'_>, t: u32, p: &Vec3) -> f64 {
@@ -150,7 +153,7 @@ fn corners(s: &SoftSurface<'_>, t: u32) -> [Vec3; 3] {
     s.model.surface.triangles[t as usize].map(|n| s.x[n as usize])
 }
 
-/// Whether two triangles cut one another, each with corners clearly on both sides of the other's plane.
+/// Whether two triangles cut one another, each with corners clearly on both endpoints of the other's plane.
 fn go_through(a: &SoftSurface<'_>, ta: u32, b: &SoftSurface<'_>, tb: u32) -> bool {
     let (p, q) = (corners(a, ta), corners(b, tb));
     let clearly = CLEARLY * a.model.surface.mean_edge.min(b.model.surface.mean_edge);

@@ -3,11 +3,11 @@
 //! Rapier moves a link by its generalized velocities only: what we do to links is handed over as
 //! `v += M⁻¹ Σ Jᵀp`; an impulse on the link's body would be lost.
 
-use super::obstacles::{RapierScene, current_mass_properties, external_force};
-use super::parts::{PhysicsParts, RapierSets};
-use crate::contact::PartnerId;
+use super::mass_properties::{current_mass_properties, external_force};
+use super::parts::{PhysicsParts, RapierSets, StepContext};
+use crate::contact::ProxyId;
 use crate::math::{Vec3, from_real};
-use crate::solver::{Articulation, Partner, Reaction, Twist};
+use crate::solver::{Articulation, Reaction, RigidProxy, Twist};
 use nalgebra::{DMatrix, Matrix6, Vector6};
 use rapier3d::dynamics::{Multibody, MultibodyIndex, RigidBodyHandle};
 use rapier3d::math::Vector;
@@ -19,37 +19,45 @@ pub(super) struct ArticulatedLinks {
     pub links: Vec<(usize, RigidBodyHandle)>,
 }
 
-/// Takes in all dynamic links of a multibody; false if rapier has not computed its mass matrix yet, or
-/// some of its joints are kinematic, of which the order of coordinates is not known.
+/// A multibody's dynamic links as proxies.
+pub(super) struct ReadArticulation {
+    /// As [`ArticulatedLinks::links`].
+    pub links: Vec<(usize, RigidBodyHandle)>,
+    pub proxies: Vec<RigidProxy>,
+    /// As [`Articulation::blocks`](crate::solver::Articulation::blocks).
+    pub blocks: Vec<Matrix6<f64>>,
+}
+
+/// Reads all dynamic links of a multibody as the articulation `number` of the step; `None` if rapier has not computed
+/// its mass matrix yet, or some of its joints are kinematic, of which the order of coordinates is not known.
 pub(super) fn read_articulation(
-    scene: &mut RapierScene,
-    sets: RapierSets<'_>,
+    context: &StepContext<'_>,
     index: MultibodyIndex,
-    gravity: Vector,
-    dt: f64,
-) -> bool {
-    let Some(multibody) = sets.multibody_joints.get_multibody(index) else { return false };
+    number: usize,
+) -> Option<ReadArticulation> {
+    let sets = context.sets;
+    let multibody = sets.multibody_joints.get_multibody(index)?;
     let dofs = multibody.ndofs();
     if dofs == 0 || multibody.inv_augmented_mass().lu_internal().nrows() != dofs {
-        return false;
+        return None;
     }
     let dynamic = |handle: RigidBodyHandle| sets.bodies.get(handle).is_some_and(|b| b.is_dynamic());
     let links = multibody.links().map(|link| (link.link_id(), link.rigid_body_handle()));
     let links: Vec<(usize, RigidBodyHandle)> = links.filter(|(_, handle)| dynamic(*handle)).collect();
     let jacobians = links.iter().map(|(id, _)| multibody.body_jacobian(*id));
     if links.is_empty() || jacobians.clone().any(|J| J.ncols() != dofs) {
-        return false;
+        return None;
     }
     let blocks = compliances(multibody, &links);
     let count = links.len();
-    let number = scene.partners.articulations.len();
+    let gravity = context.gravity_f32();
     let forces: Vec<Vector6<f64>> = links.iter().map(|(_, h)| external_wrench(sets, *h, gravity)).collect();
-    let mut partners = Vec::with_capacity(count);
+    let mut proxies = Vec::with_capacity(count);
     for (slot, &(_, handle)) in links.iter().enumerate() {
-        let Some(body) = sets.bodies.get(handle) else { return false };
+        let body = sets.bodies.get(handle)?;
         let mut gain = Vector6::zeros();
         for (other, force) in forces.iter().enumerate() {
-            gain += blocks[slot * count + other] * force * dt;
+            gain += blocks[slot * count + other] * force * context.h;
         }
         let twist = Twist { linear: from_real(body.linvel()), angular: from_real(body.angvel()) };
         let free = Twist {
@@ -57,12 +65,9 @@ pub(super) fn read_articulation(
             angular: twist.angular + gain.fixed_rows::<3>(3),
         };
         let com = from_real(current_mass_properties(sets.colliders, body).world_com);
-        let partner = Partner::Link { articulation: number, slot, com, twist, free };
-        partners.push(scene.take_in(partner, handle));
+        proxies.push(RigidProxy::Link { articulation: number, slot, com, twist, free });
     }
-    scene.partners.articulations.push(Articulation { links: partners, blocks });
-    scene.articulated.push(ArticulatedLinks { multibody: index, links });
-    true
+    Some(ReadArticulation { links, proxies, blocks })
 }
 
 /// `J_a M⁻¹ J_bᵀ` of all pairs of links, made symmetric: rapier's matrices are in single precision.
@@ -100,13 +105,14 @@ fn external_wrench(sets: RapierSets<'_>, handle: RigidBodyHandle, gravity: Vecto
 /// what external forces do over the step; hands out the bodies whose forces have to rest for it.
 pub(super) fn write_articulations(
     parts: &mut PhysicsParts<'_>,
-    scene: &RapierScene,
+    articulations: &[Articulation],
+    articulated: &[ArticulatedLinks],
     reactions: &[Reaction],
     touched: &mut Vec<RigidBodyHandle>,
 ) {
     let dt = f64::from(parts.dt);
-    for (articulation, read) in scene.partners.articulations.iter().zip(&scene.articulated) {
-        let of = |id: &PartnerId| &reactions[id.0 as usize];
+    for (articulation, read) in articulations.iter().zip(articulated) {
+        let of = |id: &ProxyId| &reactions[id.0 as usize];
         if !articulation.links.iter().any(|id| of(id).touched) {
             continue;
         }

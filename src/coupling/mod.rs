@@ -1,20 +1,29 @@
-//! Rapier's sets, read into obstacles and partners, and the reactions written back.
+//! Rapier's sets, read into obstacles and rigid proxies, and the reactions written back.
 //!
 //! Architecture invariant: the only room that reads and writes rapier's sets; `pipeline` passes them on.
-//! Everything below works on obstacles, partners and rows.
+//! Everything below works on obstacles, proxies and constraints.
 
-mod approach;
-mod articulations;
-mod closure;
-mod joint_rows;
-mod obstacles;
 mod parts;
-mod reactions;
-mod ties;
 
-pub(crate) use closure::{Around, Closure, ClosureSource};
-pub(crate) use obstacles::{RapierScene, combined, combined_between};
+mod coefficients;
+mod mass_properties;
+
+mod articulations;
+mod scene;
+
+mod joint_constraints;
+mod neighbourhood;
+mod rigid_contacts;
+mod speculative;
+
+mod attachments;
+
+mod reactions;
+
+pub(crate) use attachments::{SteppedBodies, attachment_constraints, prescribed_nodes};
+pub(crate) use coefficients::{combined, combined_between};
+pub(crate) use neighbourhood::{RigidNeighbourhood, WalkContext};
 pub use parts::PhysicsParts;
-pub(crate) use parts::{RapierSets, packed};
+pub(crate) use parts::{RapierSets, StepContext, body_handle, collider_handle, impulse_joint_handle, packed};
 pub(crate) use reactions::Reactions;
-pub(crate) use ties::{attachment_of, held_nodes, tie_rows};
+pub(crate) use scene::RapierScene;

@@ -1,7 +1,10 @@
 //! The parts of a rapier world that a step needs.
 
-use rapier3d::dynamics::{ImpulseJointSet, MultibodyJointSet, RigidBodySet};
-use rapier3d::geometry::{ColliderSet, NarrowPhase};
+use crate::math::{Vec3, to_real};
+use rapier3d::dynamics::{
+    ImpulseJointHandle, ImpulseJointSet, MultibodyJointSet, RigidBodyHandle, RigidBodySet,
+};
+use rapier3d::geometry::{ColliderHandle, ColliderSet, NarrowPhase};
 use rapier3d::math::Vector;
 use rapier3d::pipeline::PhysicsWorld;
 
@@ -60,12 +63,47 @@ pub(crate) struct RapierSets<'a> {
     pub multibody_joints: &'a MultibodyJointSet,
 }
 
+/// What every verb of a step is told.
+#[derive(Clone, Copy)]
+pub(crate) struct StepContext<'a> {
+    pub sets: RapierSets<'a>,
+    /// [m/s²].
+    pub gravity: Vec3,
+    /// Length of the step \[s\].
+    pub h: f64,
+}
+
+impl StepContext<'_> {
+    /// Gravity in rapier's precision [m/s²].
+    pub fn gravity_f32(&self) -> Vector {
+        to_real(&self.gravity)
+    }
+}
+
 /// A handle's slot and generation as one number.
 pub(crate) fn packed((index, generation): (u32, u32)) -> u64 {
     u64::from(index) << 32 | u64::from(generation)
 }
 
 /// Slot and generation of a packed handle.
-pub(super) fn unpacked(key: u64) -> (u32, u32) {
+fn unpacked(key: u64) -> (u32, u32) {
     ((key >> 32) as u32, key as u32)
+}
+
+/// The collider of a packed handle.
+pub(crate) fn collider_handle(key: u64) -> ColliderHandle {
+    let (index, generation) = unpacked(key);
+    ColliderHandle::from_raw_parts(index, generation)
+}
+
+/// The rigid body of a packed handle.
+pub(crate) fn body_handle(key: u64) -> RigidBodyHandle {
+    let (index, generation) = unpacked(key);
+    RigidBodyHandle::from_raw_parts(index, generation)
+}
+
+/// The joint of a packed handle.
+pub(crate) fn impulse_joint_handle(key: u64) -> ImpulseJointHandle {
+    let (index, generation) = unpacked(key);
+    ImpulseJointHandle::from_raw_parts(index, generation)
 }

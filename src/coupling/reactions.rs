@@ -5,11 +5,12 @@
 //! then find nothing to accelerate it. The user's force is put back afterwards.
 
 use super::articulations::write_articulations;
-use super::closure::Closure;
-use super::obstacles::{RapierScene, current_mass_properties, external_force};
+use super::mass_properties::{current_mass_properties, external_force};
+use super::neighbourhood::RigidNeighbourhood;
 use super::parts::PhysicsParts;
+use super::scene::RapierScene;
 use crate::math::{from_real, to_real};
-use crate::solver::{Partner, Reaction};
+use crate::solver::{Reaction, RigidProxy};
 use rapier3d::dynamics::{ImpulseJointHandle, JointAxesMask, MultibodyIndex, RigidBody, RigidBodyHandle};
 use rapier3d::math::Vector;
 
@@ -42,7 +43,7 @@ impl Reactions {
         parts: &mut PhysicsParts<'_>,
         scene: &RapierScene,
         reactions: &[Reaction],
-        closure: &Closure,
+        neighbourhood: &RigidNeighbourhood,
         asleep: &[RigidBodyHandle],
     ) {
         self.replaced.clear();
@@ -53,14 +54,14 @@ impl Reactions {
                 body.sleep();
             }
         }
-        self.still_motors(parts, closure);
+        self.still_motors(parts, neighbourhood);
     }
 
     fn write_bodies(&mut self, parts: &mut PhysicsParts<'_>, scene: &RapierScene, reactions: &[Reaction]) {
         let (gravity, dt) = (parts.gravity, parts.dt);
         let (bodies, colliders) = (&mut *parts.bodies, parts.colliders);
-        for ((handle, partner), reaction) in scene.handles.iter().zip(&scene.partners.list).zip(reactions) {
-            let (Some(handle), Partner::Rigid { inv_mass, inv_inertia, .. }) = (*handle, partner) else {
+        for ((handle, proxy), reaction) in scene.handles.iter().zip(&scene.proxies.list).zip(reactions) {
+            let (Some(handle), RigidProxy::Rigid { inv_mass, inv_inertia, .. }) = (*handle, proxy) else {
                 continue;
             };
             let Some(body) = bodies.get(handle).filter(|_| reaction.touched) else { continue };
@@ -84,7 +85,7 @@ impl Reactions {
 
     fn write_links(&mut self, parts: &mut PhysicsParts<'_>, scene: &RapierScene, reactions: &[Reaction]) {
         let mut touched = std::mem::take(&mut self.touched_links);
-        write_articulations(parts, scene, reactions, &mut touched);
+        write_articulations(parts, &scene.proxies.articulations, &scene.articulated, reactions, &mut touched);
         for handle in touched.drain(..) {
             let Some(body) = parts.bodies.get(handle) else { continue };
             let masses = current_mass_properties(parts.colliders, body);
@@ -96,15 +97,15 @@ impl Reactions {
     }
 
     /// Motors that were solved here rest in rapier's step, or they would act twice.
-    fn still_motors(&mut self, parts: &mut PhysicsParts<'_>, closure: &Closure) {
+    fn still_motors(&mut self, parts: &mut PhysicsParts<'_>, neighbourhood: &RigidNeighbourhood) {
         self.stilled.clear();
-        for &handle in &closure.driven {
+        for &handle in &neighbourhood.driven {
             let Some(joint) = parts.impulse_joints.get_mut(handle, false) else { continue };
             self.stilled.push((handle, joint.data.motor_axes));
             joint.data.motor_axes = JointAxesMask::empty();
         }
         self.stilled_links.clear();
-        for &(multibody, link) in &closure.driven_links {
+        for &(multibody, link) in &neighbourhood.driven_links {
             let multibody_mut = parts.multibody_joints.get_multibody_mut(multibody);
             let Some(joint) = multibody_mut.and_then(|m| m.link_mut(link)) else { continue };
             self.stilled_links.push((multibody, link, joint.joint.data.motor_axes));

@@ -2,11 +2,11 @@
 //!
 //! Stress `P = 2μ(F − R) + λ(J − 1) cof F`.
 
-use super::{ElementEnergy, Principal, Response, determinant_terms, invariants};
-use crate::material::Lame;
+use super::{ElementEnergy, Lame, Response, determinant_terms, invariants};
+use super::principal::Principal;
+use crate::math::{Mat3, Vec3};
 use crate::math::lanes::{Lane, LaneMat3};
 use crate::math::polar::polar_rotations;
-use crate::math::{Mat3, Vec3};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FixedCorotated(pub Lame);

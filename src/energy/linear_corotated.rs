@@ -4,11 +4,11 @@
 //! Stress `P = 2μ(F − R) + λ tr(RᵀF − I) R`, exact: R maximises tr(RᵀF), so its own change drops
 //! out of both terms.
 
-use super::{ElementEnergy, Principal, Response};
-use crate::material::Lame;
+use super::{ElementEnergy, Lame, Response};
+use super::principal::Principal;
+use crate::math::{Mat3, Vec3};
 use crate::math::lanes::{Lane, LaneMat3};
 use crate::math::polar::polar_rotations;
-use crate::math::{Mat3, Vec3};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LinearCorotated(pub Lame);

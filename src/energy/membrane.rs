@@ -2,8 +2,8 @@
 //! the 3×2 deformation gradient F, its polar factor R and λ̄ = 2μλ/(λ + 2μ), so that a sheet under
 //! tension is thinned by Poisson's ratio as the solid it is cut from.
 
+use super::Lame;
 use super::strain_limit::excess;
-use crate::material::{DeformableMaterial, Lame};
 use crate::math::{Mat2, Mat3x2, Vec3};
 
 /// The energy of a sheet's triangles.
@@ -35,10 +35,9 @@ pub(crate) struct MembraneMode {
 const COLLAPSED: f64 = 1.0e-9;
 
 impl Membrane {
-    pub fn new(material: &DeformableMaterial) -> Self {
-        let Lame { mu, lambda } = material.lame();
-        let lambda = 2.0 * mu * lambda / (lambda + 2.0 * mu);
-        Self { mu, lambda, limits: material.strain_limits, limit_weight: material.limit_weight() }
+    /// Of a solid's Lamé parameters, with its limits of strain and the weight \[Pa\] of what is beyond them.
+    pub fn new(Lame { mu, lambda }: Lame, limits: Option<[f64; 2]>, limit_weight: f64) -> Self {
+        Self { mu, lambda: 2.0 * mu * lambda / (lambda + 2.0 * mu), limits, limit_weight }
     }
 
     pub fn evaluate(&self, F: &Mat3x2) -> MembraneResponse {
@@ -149,9 +148,14 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// Of Young's modulus and Poisson's ratio.
+    fn sheet(e: f64, nu: f64, limits: Option<[f64; 2]>) -> Membrane {
+        let lame = Lame { mu: e / (2.0 * (1.0 + nu)), lambda: e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)) };
+        Membrane::new(lame, limits, 20.0 * e)
+    }
+
     fn sheets() -> [Membrane; 2] {
-        let material = DeformableMaterial::new(1.0, 0.4);
-        [Membrane::new(&material), Membrane::new(&material.strain_limits(0.9, 1.1))]
+        [sheet(1.0, 0.4, None), sheet(1.0, 0.4, Some([0.9, 1.1]))]
     }
 
     fn matrix(size: f64) -> impl Strategy<Value = Mat3x2> {
@@ -195,7 +199,7 @@ mod tests {
     fn pulled_along_one_axis_a_sheet_has_youngs_modulus() {
         // σ = E ε and the width shrinks by ν ε, to the second order in ε = 1e-5.
         let (e, nu, strain) = (1.0, 0.4, 1e-5);
-        let sheet = Membrane::new(&DeformableMaterial::new(e, nu));
+        let sheet = sheet(e, nu, None);
         let mut F = Mat3x2::identity();
         F[(0, 0)] += strain;
         F[(1, 1)] -= nu * strain;

@@ -86,6 +86,13 @@ energies! { $
     neo_hookean::NeoHookean,
 }
 
+/// Lamé parameters μ, λ \[Pa\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Lame {
+    pub mu: f64,
+    pub lambda: f64,
+}
+
 /// What an element answers to its deformation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Response {

@@ -4,11 +4,11 @@
 //! At small strain linear elasticity of (μ, λ); finite at any F, inverted ones included. Stress
 //! `P = μF + (λ′(J − 1) − μ) cof F`.
 
-use super::{ElementEnergy, Principal, Response, determinant_terms, invariants};
-use crate::material::Lame;
+use super::{ElementEnergy, Lame, Response, determinant_terms, invariants};
+use super::principal::Principal;
+use crate::math::{Mat3, Vec3};
 use crate::math::lanes::{Lane, LaneMat3};
 use crate::math::polar::polar_rotations;
-use crate::math::{Mat3, Vec3};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NeoHookean(pub Lame);

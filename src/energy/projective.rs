@@ -5,11 +5,11 @@
 //! term is `λ/2·(tr ε)²`: the distance to det = 1 is |tr ε|/√3, hence 3λ and not λ.
 //! Stress `P = 2μ(F − R) + 3λ(F − D)`: both are gradients of squared distances.
 
-use super::{ElementEnergy, Principal, Response, determinant_terms};
-use crate::material::Lame;
+use super::{ElementEnergy, Lame, Response, determinant_terms};
+use super::principal::Principal;
+use crate::math::{Mat3, Vec3};
 use crate::math::lanes::{LANES, Lane, LaneMat3};
 use crate::math::polar::{polar_rotations, signed_svd};
-use crate::math::{Mat3, Vec3};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Projective(pub Lame);

@@ -9,7 +9,6 @@
 //! | muscle fibre | the stretched direction F m [–] | the stretch asked for |
 
 use super::strain_limit::excess;
-use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3};
 
 /// What a stencil stands for: it decides on the modulus.
@@ -25,28 +24,16 @@ pub(crate) enum StencilKind {
     Fibre,
 }
 
-impl StencilKind {
-    /// What the weight per modulus is to be multiplied by \[Pa\].
-    pub fn modulus(self, material: &DeformableMaterial) -> f64 {
-        let nu = material.poisson_ratio;
-        match self {
-            Self::Stretch | Self::RodBending => material.youngs_modulus,
-            Self::SheetBending => material.youngs_modulus / (1.0 - nu * nu),
-            Self::Fibre => material.fibre_modulus,
-        }
-    }
-}
-
 /// A length that is kept.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Keeper {
+pub(crate) struct LengthEnergy {
     pub length: f64,
     pub weight: f64,
     /// Least and largest length, and the weight of what is beyond.
     pub limits: Option<([f64; 2], f64)>,
 }
 
-impl Keeper {
+impl LengthEnergy {
     /// Energy and its gradient over b. A zero vector that wants to have a length has no direction: any
     /// will do.
     pub fn response(&self, b: &Vec3) -> (f64, Vec3) {
@@ -96,21 +83,21 @@ mod tests {
             prop_assume!(b.norm() > 0.2);
             let limits = [0.9 * length, 1.1 * length];
             prop_assume!(limits.iter().all(|l| (b.norm() - l).abs() > 1e-3));
-            let keeper = Keeper { length, weight: 2.0, limits: limited.then_some((limits, 30.0)) };
+            let length_energy = LengthEnergy { length, weight: 2.0, limits: limited.then_some((limits, 30.0)) };
             let eps = 1e-6;
-            let [ahead, behind] = [eps, -eps].map(|t| keeper.response(&(b + d * t)));
-            let work = keeper.response(&b).1.dot(&d);
+            let [ahead, behind] = [eps, -eps].map(|t| length_energy.response(&(b + d * t)));
+            let work = length_energy.response(&b).1.dot(&d);
             // Central differences: 1e-12 · third derivative (to 1e3) and 1e-16/1e-6 of rounding.
             prop_assert!(((ahead.0 - behind.0) / (2.0 * eps) - work).abs() < 1e-7);
             let slope = (ahead.1 - behind.1) / (2.0 * eps);
-            prop_assert!((slope - keeper.tangent(&b) * d).norm() < 1e-6);
+            prop_assert!((slope - length_energy.tangent(&b) * d).norm() < 1e-6);
         }
     }
 
     #[test]
     fn what_has_no_length_is_pushed_apart_in_some_direction() {
-        let keeper = Keeper { length: 1.0, weight: 1.0, limits: None };
-        let (energy, force) = keeper.response(&Vec3::zeros());
+        let length_energy = LengthEnergy { length: 1.0, weight: 1.0, limits: None };
+        let (energy, force) = length_energy.response(&Vec3::zeros());
         assert!(energy == 0.5 && (force.norm() - 1.0).abs() < 1e-15);
     }
 }

@@ -1,7 +1,8 @@
 //! Limits on the principal stretches, on top of another energy: `w/2 Σ (σ − clamp(σ))²`, the constraint
 //! of [Bouaziz et al. 2014] with the weight w that is [`STIFFENING`] times the material's own.
 
-use super::{ElementEnergy, Principal, Response};
+use super::principal::Principal;
+use super::{ElementEnergy, Response};
 use crate::math::lanes::{LANES, LaneMat3};
 use crate::math::polar::signed_svd;
 use crate::math::{Mat3, Vec3};

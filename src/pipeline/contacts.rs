@@ -1,6 +1,6 @@
 //! Contacts as users read them.
 
-use crate::body::DeformableBodyHandle;
+use crate::body::{DeformableBodyHandle, JointRole};
 use rapier3d::dynamics::{ImpulseJointHandle, RigidBodyHandle};
 use rapier3d::geometry::ColliderHandle;
 use rapier3d::math::Vector;
@@ -62,19 +62,6 @@ pub enum SolvedJoint {
     Impulse(ImpulseJointHandle),
     /// The joint of a multibody that leads to this link.
     Multibody(RigidBodyHandle),
-}
-
-/// What a row of a joint is there for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum JointRole {
-    /// Holds a locked axis.
-    Lock,
-    /// Keeps to the lower limit.
-    LowerLimit,
-    /// Keeps to the upper limit.
-    UpperLimit,
-    /// Drives. The motor rests in rapier's own step, so this is all of its force.
-    Motor,
 }
 
 /// Force of one axis of a joint in the last step.

@@ -1,22 +1,16 @@
-//! The step, told as a list of verbs, and the world that owns it.
+//! What users name of a step: the world, the pipeline, its parameters, counters and contacts; and the step itself.
 
 mod contacts;
-mod crossings;
-mod encounters;
-mod ending;
-mod grouping;
 mod parameters;
+
+mod step;
+
 #[allow(clippy::module_inception)]
 mod pipeline;
-mod readout;
-mod sleeping;
-mod threads;
-mod work;
+
 mod world;
 
-pub use contacts::{
-    DeformableContact, DeformablePairContact, JointForce, JointRole, RigidContact, SolvedJoint,
-};
+pub use contacts::{DeformableContact, DeformablePairContact, JointForce, RigidContact, SolvedJoint};
 pub use parameters::{DeformableCounters, DeformableParameters};
 pub use pipeline::DeformablePipeline;
 pub use world::DeformableWorld;

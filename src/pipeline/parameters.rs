@@ -16,7 +16,7 @@ pub struct DeformableParameters {
     /// Rigid bodies, at the most, whose contacts and joints with other rigid bodies enter the solve,
     /// counted from the touched ones outward. Zero leaves these to rapier alone: its contacts are springs
     /// that give way under loads many times the body's own weight.
-    pub closure_bodies: usize,
+    pub neighbourhood_bodies: usize,
     /// Memory \[bytes\] for columns of inverses, kept between steps for contacts.
     pub column_budget: usize,
 }
@@ -27,7 +27,7 @@ impl Default for DeformableParameters {
             contact_tolerance: 1.0e-8,
             max_corrective_velocity: 1.0,
             restitution_threshold: 0.5,
-            closure_bodies: 64,
+            neighbourhood_bodies: 64,
             column_budget: 512 << 20,
         }
     }
@@ -62,8 +62,8 @@ pub struct DeformableCounters {
     pub contacts: usize,
     /// Contacts that carry force.
     pub active_contacts: usize,
-    /// Rows of what holds the touched rigid bodies: rapier's contacts and joints.
-    pub closure_rows: usize,
+    /// Constraints of what holds the touched rigid bodies: rapier's contacts and joints.
+    pub neighbourhood_constraints: usize,
     /// Global iterations, summed over islands.
     pub iterations: usize,
     /// Bodies that stopped at their iteration limit, above their tolerance.
@@ -90,8 +90,8 @@ pub struct DeformableCounters {
     pub factor_bytes: usize,
     /// Bytes of columns held.
     pub column_bytes: usize,
-    /// Bodies whose step would have made energy, and that kept their shapes instead.
-    pub gave_up: usize,
+    /// Steps that would have made energy and were rejected: the bodies kept their shapes.
+    pub rejected_steps: usize,
     /// Bodies put aside because their state was not finite.
     pub quarantined: usize,
     /// Whether the step was skipped because dt or gravity was not usable.
@@ -118,12 +118,12 @@ impl DeformableCounters {
         self.newton_steps += report.newton_steps;
         self.contact_factorizations += report.cone_factorizations;
         self.contact_failures += report.cone_failures;
-        self.elements += report.effort.elements;
-        self.solves += report.effort.solves;
-        self.solve_bytes += report.effort.solve_bytes;
-        self.element_time += report.effort.element_time;
-        self.linear_time += report.effort.linear_time;
-        self.contact_time += report.effort.contact_time;
+        self.elements += report.counters.elements;
+        self.solves += report.counters.solves;
+        self.solve_bytes += report.counters.solve_bytes;
+        self.element_time += report.counters.element_time;
+        self.linear_time += report.counters.linear_time;
+        self.contact_time += report.counters.contact_time;
     }
 
     /// Time of the whole step without rapier's own.

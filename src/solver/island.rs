@@ -1,20 +1,18 @@
-//! Bodies and partners that contacts connect, solved together.
+//! Bodies and proxies that contacts connect, solved together.
 //!
 //! Every iteration: `y = x + H(r + Jᵀλ⁰)` with the last forces λ⁰, the contact problem at y for λ,
 //! `x ← y + P Jᵀ(λ − λ⁰)`, and the guard. H is P, or its quasi-Newton update: at the fixed point
-//! λ = λ⁰ both ask for `r + Jᵀλ = 0`. If the guard finds the energy risen, the metric is scaled
+//! λ = λ⁰ both ask for `r + Jᵀλ = 0`. If the guard finds the energy risen, the preconditioner is scaled
 //! (A → cA) and the iteration done again, contact problem included: shortening the step instead would
 //! break the contacts that were just solved.
 
-use super::accelerator::Accelerator;
-use super::body_problem::BodyProblem;
-use super::cone_newton::ConeTolerance;
-use super::contact_system::{ContactLimits, ContactSystem};
-use super::effort::{Effort, timed};
-use super::factor_cache::FactorCache;
-use super::partner::Partners;
-use super::tangent::{Factors, Tangents};
+use super::counters::SolveCounters;
 use crate::body::{Acceleration, Solver};
+use crate::profiler::timed;
+use crate::solver::acceleration::Accelerator;
+use crate::solver::body_step::{BodyProblem, Factors, NewtonFactors};
+use crate::solver::cone::ConeTolerance;
+use crate::solver::constraints::{ContactSystem, SolveContext};
 
 /// Bodies whose steps depend on one another.
 #[derive(Default)]
@@ -24,7 +22,7 @@ pub(crate) struct Island {
     pub report: IslandReport,
     accelerations: Vec<Accelerator>,
     assembly: Assembly,
-    tangents: Tangents,
+    newton_factors: NewtonFactors,
 }
 
 /// What is to be done to the contact problem before it is solved.
@@ -45,7 +43,7 @@ pub(crate) struct IslandReport {
     pub newton_steps: usize,
     pub cone_factorizations: usize,
     pub cone_failures: usize,
-    pub effort: Effort,
+    pub counters: SolveCounters,
 }
 
 /// What became of an iteration.
@@ -67,27 +65,27 @@ const OVERLAPPING: f64 = -1.0e-5;
 /// Residual over forces beyond which a step is looked at again.
 const FAR_FROM_SOLVED: f64 = 0.1;
 /// Largest factor on A that the guard tries.
-const MAX_SCALING: f64 = 1024.0;
+const MAX_STEP_DAMPING: f64 = 1024.0;
 /// Residual relative to the forces that is rounding and nothing else: sums of some tens of terms.
 pub(crate) const ROUNDING: f64 = 1.0e-12;
 
 impl Island {
     /// Does the iterations of a step of `h` \[s\]; results are in the bodies' `current` and in the
     /// contacts' forces.
-    pub fn solve(&mut self, factors: &FactorCache, partners: &Partners, h: f64, limits: &ContactLimits) {
+    pub fn solve(&mut self, context: &SolveContext<'_>) {
         self.report = IslandReport::default();
-        self.tangents.begin(self.bodies.len());
+        self.newton_factors.begin(self.bodies.len());
         for body in &mut self.bodies {
-            body.choose_start(factors.get(body.factor));
+            body.choose_initial_guess(context.factors.get(body.factor));
         }
-        self.contacts.begin(&mut self.bodies, partners, h, limits);
+        self.contacts.begin(&mut self.bodies, context);
         self.assembly = Assembly::Anew;
         self.accelerations.resize_with(self.bodies.len(), Accelerator::default);
         self.accelerations.iter_mut().for_each(Accelerator::clear);
         let iterations = self.bodies.iter().map(|b| b.settings.max_iterations).max().unwrap_or(0);
         for _ in 0..iterations {
             self.report.iterations += 1;
-            let outcome = self.iterate(factors, partners, h, limits);
+            let outcome = self.iterate(context);
             let converged =
                 |b: &BodyProblem| b.residual() <= b.settings.tolerance.max(ROUNDING) * b.force_scale();
             let done = match outcome {
@@ -108,75 +106,63 @@ impl Island {
         if self.contacts.is_empty() {
             self.bodies.iter_mut().filter(|b| b.key.pins.is_empty()).for_each(BodyProblem::balance);
         } else {
-            self.give_up_what_gains_energy(factors, partners, h, limits);
+            self.reject_steps_that_gain_energy(context);
         }
-        self.bodies.iter().for_each(|b| self.report.effort.add(&b.metric.effort));
+        self.bodies.iter().for_each(|b| self.report.counters.add(&b.preconditioner.counters));
     }
 
     /// Bodies whose step is far from solved and would gain energy give it up: where forces change wildly from iteration
     /// to iteration, what they have done to a body is not what the last ones take from others.
-    pub fn give_up_what_gains_energy(
-        &mut self,
-        factors: &FactorCache,
-        partners: &Partners,
-        h: f64,
-        limits: &ContactLimits,
-    ) {
+    pub fn reject_steps_that_gain_energy(&mut self, context: &SolveContext<'_>) {
         loop {
             let mut gains = false;
             for index in 0..self.bodies.len() {
                 let body = &self.bodies[index];
                 let is_solved = body.residual() <= FAR_FROM_SOLVED * body.force_scale();
-                if !is_solved && self.would_gain_energy(index, 0.0, partners, h) {
-                    self.bodies[index].gave_up = true;
+                if !is_solved && self.would_gain_energy(index, 0.0, context) {
+                    self.bodies[index].is_rejected = true;
                     gains = true;
                 }
             }
             if !gains {
                 break;
             }
-            self.move_as_wholes(factors, partners, h, limits);
+            self.step_rigid_fallbacks(context);
         }
     }
 
     /// Whether a body's step makes energy, with what its contacts make and `besides` \[J\]; not if it has given it up.
-    pub fn would_gain_energy(&mut self, index: usize, besides: f64, partners: &Partners, h: f64) -> bool {
-        if self.bodies[index].gave_up {
+    pub fn would_gain_energy(&mut self, index: usize, besides: f64, context: &SolveContext<'_>) -> bool {
+        if self.bodies[index].is_rejected {
             return false;
         }
-        let by_contacts = self.contacts.made_energy(index, &self.bodies, partners, h);
+        let by_contacts = self.contacts.made_energy(index, &self.bodies, context);
         self.bodies[index].gains_energy(by_contacts.max(0.0) + besides)
     }
 
     /// Takes the step of bodies that have given it up in their shapes, with contacts solved anew.
-    pub fn move_as_wholes(
-        &mut self,
-        factors: &FactorCache,
-        partners: &Partners,
-        h: f64,
-        limits: &ContactLimits,
-    ) {
+    pub fn step_rigid_fallbacks(&mut self, context: &SolveContext<'_>) {
         for index in 0..self.bodies.len() {
-            if self.bodies[index].gave_up {
+            if self.bodies[index].is_rejected {
                 self.contacts.restart(index);
             }
         }
-        self.contacts.lay_changes(&mut self.bodies);
-        let own = Factors { cache: factors, tangents: &self.tangents };
+        self.contacts.scatter_changes(&mut self.bodies);
+        let own = Factors { cache: context.factors, newton: &self.newton_factors };
         for (index, body) in self.bodies.iter_mut().enumerate() {
             let factor = own.of(index, body);
-            if body.gave_up {
-                body.begin_as_a_whole(factor);
+            if body.is_rejected {
+                body.begin_rigid_fallback(factor);
             } else {
                 body.trial.x.clone_from(&body.current.x);
                 body.contact_step(factor);
             }
         }
         self.assembly = Assembly::Anew;
-        self.solve_contacts(factors, partners, h, limits);
+        self.solve_contacts(context);
         for body in &mut self.bodies {
-            if body.gave_up {
-                body.end_as_a_whole();
+            if body.is_rejected {
+                body.finish_rigid_fallback();
             } else {
                 body.bend_step_to_rotation();
                 body.evaluate_trial();
@@ -186,27 +172,21 @@ impl Island {
     }
 
     /// One iteration.
-    fn iterate(
-        &mut self,
-        factors: &FactorCache,
-        partners: &Partners,
-        h: f64,
-        limits: &ContactLimits,
-    ) -> Outcome {
-        if self.tangents.refresh(&mut self.bodies, factors, &self.contacts.rows) {
+    fn iterate(&mut self, context: &SolveContext<'_>) -> Outcome {
+        if self.newton_factors.refresh(&mut self.bodies, context.factors, &self.contacts.constraints) {
             self.assembly = self.assembly.max(Assembly::Refreshed);
         }
         let mut outcome;
         loop {
             outcome = Outcome::Descended;
-            let own = Factors { cache: factors, tangents: &self.tangents };
+            let own = Factors { cache: context.factors, newton: &self.newton_factors };
             let bodies = self.bodies.iter_mut().zip(&mut self.accelerations);
             for (index, (body, acceleration)) in bodies.enumerate() {
                 let kind = acceleration_of(body, &self.contacts);
                 acceleration.step(kind, body, own.of(index, body));
             }
             if !self.contacts.is_empty() {
-                self.solve_contacts(factors, partners, h, limits);
+                self.solve_contacts(context);
                 for body in &mut self.bodies {
                     if body.bend_step_to_rotation() {
                         outcome = Outcome::Turned;
@@ -214,20 +194,20 @@ impl Island {
                 }
             }
             let mut descends = true;
-            let mut rescaled = false;
+            let mut damped_more = false;
             let mut stalled = 0;
             for (body, acceleration) in self.bodies.iter_mut().zip(&mut self.accelerations) {
                 body.evaluate_trial();
                 if body.trial_descends() {
                     continue;
                 }
-                // An update that does not descend is forgotten before the metric is doubted. At the end
+                // An update that does not descend is forgotten before the preconditioner is doubted. At the end
                 // of the scale the body stays where it is: its step would have been a thousandth.
                 if !acceleration.is_empty() {
                     acceleration.clear();
-                } else if body.scaling < MAX_SCALING {
-                    body.scaling *= 2.0;
-                    rescaled = true;
+                } else if body.step_damping < MAX_STEP_DAMPING {
+                    body.step_damping *= 2.0;
+                    damped_more = true;
                 } else {
                     body.reject_trial();
                     stalled += 1;
@@ -242,7 +222,7 @@ impl Island {
             if descends {
                 break;
             }
-            if rescaled {
+            if damped_more {
                 self.assembly = self.assembly.max(Assembly::Refreshed);
             }
         }
@@ -254,47 +234,47 @@ impl Island {
     }
 
     /// Brings W up to date, and the solver's expectation where the problem is another one.
-    fn assemble_contacts(&mut self, factors: &FactorCache, partners: &Partners, h: f64) {
+    fn assemble_contacts(&mut self, context: &SolveContext<'_>) {
         let assembly = std::mem::take(&mut self.assembly);
         if assembly == Assembly::Done {
             return;
         }
         let (contacts, bodies) = (&mut self.contacts, &self.bodies);
-        let time = &mut self.report.effort.contact_time;
-        let factors = Factors { cache: factors, tangents: &self.tangents };
-        timed(time, || contacts.assemble(bodies, factors, partners, h));
+        let time = &mut self.report.counters.contact_time;
+        let factors = Factors { cache: context.factors, newton: &self.newton_factors };
+        timed(time, || contacts.assemble(bodies, factors, context));
         if assembly == Assembly::Anew {
-            contacts.expect(bodies, partners, h);
+            contacts.predict(bodies, context);
         }
     }
 
     /// Solves the contacts at the trial positions and moves the bodies to what comes of it; again for those
     /// that were thought to stay open and did not.
-    fn solve_contacts(&mut self, factors: &FactorCache, partners: &Partners, h: f64, limits: &ContactLimits) {
+    fn solve_contacts(&mut self, context: &SolveContext<'_>) {
         let heaviest = self.bodies.iter().map(|b| b.weight).fold(0.0, f64::max);
         let tolerance = ConeTolerance {
-            relative: limits.tolerance,
+            relative: context.limits.tolerance,
             // Without gravity or forces any positive number serves as the scale of nothing.
             floor: (1e-3 * heaviest).max(1e-12),
         };
         for round in 0..ROUNDS {
             let slack = if round == 0 { NEARLY_CLOSED } else { OVERLAPPING };
-            if self.contacts.take_in(&self.bodies, partners, h, slack) {
+            if self.contacts.activate(&self.bodies, context, slack) {
                 self.assembly = Assembly::Anew;
             } else if round > 0 {
                 break;
             }
-            self.assemble_contacts(factors, partners, h);
+            self.assemble_contacts(context);
             let (contacts, bodies) = (&mut self.contacts, &mut self.bodies);
-            let time = &mut self.report.effort.contact_time;
-            let (work, changed) = timed(time, || contacts.solve(bodies, partners, h, tolerance));
+            let time = &mut self.report.counters.contact_time;
+            let (work, changed) = timed(time, || contacts.solve(bodies, context, tolerance));
             self.report.newton_steps += work.newton_steps;
             self.report.cone_factorizations += work.factorizations;
             self.report.cone_failures += work.failures;
             if !changed {
                 break;
             }
-            let own = Factors { cache: factors, tangents: &self.tangents };
+            let own = Factors { cache: context.factors, newton: &self.newton_factors };
             for (index, body) in self.bodies.iter_mut().enumerate() {
                 body.contact_step(own.of(index, body));
             }
@@ -306,6 +286,6 @@ impl Island {
 /// and a quasi-Newton update would feed the last digits of the contact forces back into them.
 fn acceleration_of(body: &BodyProblem, contacts: &ContactSystem) -> Acceleration {
     let is_newton = body.settings.solver == Solver::Newton;
-    let plain = is_newton || (!contacts.is_empty() && !body.metric.is_per_node());
+    let plain = is_newton || (!contacts.is_empty() && !body.preconditioner.is_per_node());
     if plain { Acceleration::None } else { body.settings.acceleration }
 }

@@ -1,41 +1,28 @@
-//! One step of the bodies: prediction, the constant matrix and its factor, the global iteration, and
-//! the contact problem in it.
+//! One step of the bodies: the constant matrix and its factor, the global iteration, and the contact problem in it.
 //!
-//! Architecture invariant: nothing here knows rapier; only `factor.rs` names faer.
+//! Architecture invariants: nothing here knows rapier; only `linear/factor.rs` names faer; a room imports from those
+//! above it in this list only.
 
-mod accelerator;
-mod anderson;
-mod block_matrix;
-mod body_problem;
-mod chebyshev;
-mod clusters;
-mod columns;
-mod cone_hessian;
-mod cone_newton;
-mod contact_groups;
-mod contact_system;
-mod delassus;
-mod effort;
-mod ending;
-mod factor;
-mod factor_cache;
+mod counters;
+
+pub(crate) mod linear;
+
+pub(crate) mod body_step;
+
+pub(crate) mod acceleration;
+
+pub(crate) mod cone;
+
+pub(crate) mod constraints;
+
 mod island;
-mod lbfgs;
-mod metric;
-mod operator;
-mod partner;
-mod starting;
-mod supernodes;
-mod sweeps;
-mod system;
-mod tangent;
+
 #[cfg(test)]
 mod tests;
-mod whole;
 
-pub(crate) use body_problem::{BodyProblem, SECOND_ORDER};
-pub(crate) use contact_system::ContactLimits;
-pub(crate) use factor_cache::{FactorCache, FactorId};
+pub(crate) use body_step::{BodyProblem, SECOND_ORDER};
+pub(crate) use constraints::{
+    Articulation, ContactLimits, Reaction, RigidProxies, RigidProxy, SolveContext, Twist,
+};
 pub(crate) use island::{Island, IslandReport, ROUNDING};
-pub(crate) use partner::{Articulation, Partner, Partners, Reaction, Twist};
-pub(crate) use system::FactorKey;
+pub(crate) use linear::{FactorCache, FactorId, FactorKey};

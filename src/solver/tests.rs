@@ -1,19 +1,21 @@
 //! The solver against dense and brute-force twins.
 
-use super::block_matrix::BlockMatrix;
-use super::body_problem::BodyProblem;
-use super::cone_newton::{ConeProblem, ConeSolver, ConeTolerance};
-use super::contact_system::{ContactLimits, ContactSystem};
-use super::factor::FactorScratch;
-use super::factor_cache::{FactorCache, SystemFactor};
-use super::island::Island;
-use super::operator::{ConjugateScratch, StiffnessOperator};
-use super::partner::{Partner, Partners, Reaction, Twist};
-use super::system::{FactorKey, assemble};
-use crate::body::{
-    ContactKey, DeformableBody, DeformableBodyBuilder, FactorPrecision, Frames, SolverSettings, SystemMatrix,
+use super::body_step::BodyProblem;
+use super::cone::{ConeProblem, ConeSolver, ConeTolerance, project};
+use super::constraints::{
+    ContactLimits, ContactSystem, Reaction, RigidProxies, RigidProxy, SolveContext, Twist,
 };
-use crate::contact::{Law, PartnerId, Row, Side, cone};
+use super::island::Island;
+use super::linear::{
+    BlockMatrix, ConjugateScratch, FactorCache, FactorKey, FactorScratch, StiffnessOperator, SystemFactor,
+    assemble, pattern_of,
+};
+use crate::body::{
+    ConstraintKey, DeformableBody, DeformableBodyBuilder, FactorPrecision, Feature, Frames, ObstacleContact,
+    SolverSettings,
+};
+use crate::contact::{Constraint, Endpoint, Law, ProxyId};
+use crate::fem::SystemMatrix;
 use crate::material::DeformableMaterial;
 use crate::math::lanes::Lane;
 use crate::math::{Mat3, Vec3};
@@ -53,13 +55,13 @@ fn prepared_of(mut body: DeformableBody) -> (FactorCache, BodyProblem) {
     let made = cache.prepare(&FactorKey::new(&body, H), &body, H, all).unwrap();
     let mut problem = BodyProblem::new(&body, H, &Vec3::new(0.0, -9.81, 0.0), &[]);
     problem.factor = made.id;
-    problem.choose_start(cache.get(problem.factor));
+    problem.choose_initial_guess(cache.get(problem.factor));
     (cache, problem)
 }
 
 /// The dense matrix of a body.
 fn dense(body: &DeformableBody, system: SystemMatrix) -> DMatrix<f64> {
-    let symbolic = super::system::symbolic(&body.model, system).unwrap();
+    let symbolic = pattern_of(&body.model, system).unwrap();
     let values = assemble(&body.model, &body.material, &[], system, H, &symbolic);
     let n = symbolic.column_starts().len() - 1;
     let mut A = DMatrix::zeros(n, n);
@@ -97,11 +99,11 @@ fn contact_set_elimination_is_the_surface_block_solve() {
     let dofs: Vec<usize> =
         contact.iter().flat_map(|&s| (0..3).map(move |c| 3 * surface.nodes[s] as usize + c)).collect();
     let b = DVector::from_fn(n, |i, _| ((i * 37 % 101) as f64 - 50.0) * 10.0);
-    let goal = DVector::from_fn(dofs.len(), |i, _| ((i * 13 % 17) as f64 - 8.0) * 1e-3);
+    let target_gap = DVector::from_fn(dofs.len(), |i, _| ((i * 13 % 17) as f64 - 8.0) * 1e-3);
     // The partition, densely.
     let free: Vec<usize> = (0..n).filter(|i| !dofs.contains(i)).collect();
     let mut x = DVector::zeros(n);
-    dofs.iter().zip(goal.iter()).for_each(|(&i, g)| x[i] = *g);
+    dofs.iter().zip(target_gap.iter()).for_each(|(&i, g)| x[i] = *g);
     let rhs = DVector::from_fn(free.len(), |i, _| b[free[i]] - A.row(free[i]).dot(&x.transpose()));
     let solved = A.select_rows(&free).select_columns(&free).cholesky().unwrap().solve(&rhs);
     free.iter().zip(solved.iter()).for_each(|(&i, v)| x[i] = *v);
@@ -112,7 +114,7 @@ fn contact_set_elimination_is_the_surface_block_solve() {
     });
     let solve = |v: &DVector<f64>| DVector::from_vec(solve_by(factor, v.as_slice()));
     let y = solve(&b);
-    let lambda = W.cholesky().unwrap().solve(&(goal - y.select_rows(&dofs)));
+    let lambda = W.cholesky().unwrap().solve(&(target_gap - y.select_rows(&dofs)));
     let mut push = DVector::zeros(n);
     dofs.iter().zip(lambda.iter()).for_each(|(&i, l)| push[i] = *l);
     let twin = y + solve(&push);
@@ -121,7 +123,7 @@ fn contact_set_elimination_is_the_surface_block_solve() {
 }
 
 #[test]
-fn delassus_blocks_are_what_the_metric_does() {
+fn delassus_blocks_are_what_the_preconditioner_does() {
     for (system, frames, pinned, clusters) in [
         (SystemMatrix::Laplacian, Frames::Floating, false, 0),
         (SystemMatrix::Laplacian, Frames::Floating, false, 1),
@@ -139,12 +141,12 @@ fn delassus_blocks_are_what_the_metric_does() {
             if problem.key.pins.contains(&(a as u32)) || problem.key.pins.contains(&(b as u32)) {
                 continue;
             }
-            let block = problem.metric.compliance(factor, &factor.columns.block(i, j), a, b);
+            let block = problem.preconditioner.compliance(factor, &factor.columns.block(i, j), a, b);
             for c in 0..3 {
                 let mut push = vec![Vec3::zeros(); model.rest.len()];
                 push[b] = Vec3::ith(c, 1.0);
                 let mut moved = vec![Vec3::zeros(); push.len()];
-                problem.metric.apply(factor, &push, &mut moved);
+                problem.preconditioner.apply(factor, &push, &mut moved);
                 let moved = moved[a];
                 // Two solves of a matrix of condition 1e3.
                 assert!((moved - block.column(c)).norm() < 1e-12 * block.norm(), "{system:?} {frames:?}");
@@ -183,13 +185,13 @@ fn laplacian_with_clusters_does_not_resist_rotation() {
         let mut cache = FactorCache::default();
         let made = cache.prepare(&FactorKey::new(&body, H), &body, H, std::iter::empty()).unwrap();
         let mut problem = BodyProblem::new(&body, H, &Vec3::zeros(), &[]);
-        problem.choose_start(cache.get(made.id));
+        problem.choose_initial_guess(cache.get(made.id));
         let omega = Vec3::new(0.3, 0.5, -0.8);
         let motion: Vec<Vec3> = body.state.x.iter().map(|x| omega.cross(x)).collect();
         let push: Vec<Vec3> =
             motion.iter().enumerate().map(|(i, v)| v * (body.node_mass(i) / (H * H))).collect();
         let mut moved = vec![Vec3::zeros(); push.len()];
-        problem.metric.apply(cache.get(made.id), &push, &mut moved);
+        problem.preconditioner.apply(cache.get(made.id), &push, &mut moved);
         let error = moved.iter().zip(&motion).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         // Without them a hundredth of it moves: stiffness over inertia is 1e2 and more here.
         assert!(error < 1e-10, "{clusters} clusters: {error}");
@@ -223,7 +225,7 @@ fn rounded_factors_have_the_columns_that_they_solve_for() {
 }
 
 #[test]
-fn translation_is_exact_in_every_metric() {
+fn translation_is_exact_in_every_preconditioner() {
     for (system, frames) in [
         (SystemMatrix::Laplacian, Frames::Floating),
         (SystemMatrix::RestStiffness, Frames::Floating),
@@ -236,7 +238,7 @@ fn translation_is_exact_in_every_metric() {
         let weight: Vec<Vec3> =
             problem.model.node_volumes.iter().map(|v| Vec3::y() * (v * density)).collect();
         let mut moved = vec![Vec3::zeros(); weight.len()];
-        problem.metric.apply(factor, &weight, &mut moved);
+        problem.preconditioner.apply(factor, &weight, &mut moved);
         for moved in moved {
             assert!((moved - Vec3::y() * (H * H)).norm() < 1e-12 * H * H, "{system:?} {frames:?}");
         }
@@ -292,7 +294,7 @@ fn brute_force(problem: &ConeProblem) -> Vec<f64> {
         let before = lambda.clone();
         for i in 0..problem.contacts() {
             let u = [0, 1, 2].map(|c| ahead[3 * i + c] - step * (Wl[3 * i + c] + problem.g[3 * i + c]));
-            lambda[3 * i..3 * i + 3].copy_from_slice(&cone::project(u, problem.laws[i]).force);
+            lambda[3 * i..3 * i + 3].copy_from_slice(&project(u, problem.laws[i]).force);
         }
         let next = 0.5 * (1.0 + (1.0 + 4.0 * t * t).sqrt());
         (0..m).for_each(|k| ahead[k] = lambda[k] + (t - 1.0) / next * (lambda[k] - before[k]));
@@ -339,19 +341,20 @@ fn touching() -> (FactorCache, Island) {
         .collect();
     for n in nodes {
         let x = problem.x_start[n as usize];
-        let soft = Side::Soft { body: 0, nodes: [n, 0, 0], weights: [1.0, 0.0, 0.0] };
-        let key = ContactKey { obstacle: 0, part: 0, feature: n, slot: 0 };
-        let mut row =
-            Row::new([soft, Side::Partner { partner: PartnerId(0), point: x }], Vec3::y(), 0.0, key);
-        row.law = Law::Contact { friction: 0.4 };
-        island.contacts.rows.push(row);
+        let soft = Endpoint::Soft { body: 0, nodes: [n, 0, 0], weights: [1.0, 0.0, 0.0] };
+        let key = ObstacleContact { collider: 0, part: 0, feature: Feature::Node(n), slot: 0 };
+        let key = ConstraintKey::Obstacle(key);
+        let mut constraint =
+            Constraint::new([soft, Endpoint::Rigid { proxy: ProxyId(0), point: x }], Vec3::y(), 0.0, key);
+        constraint.law = Law::Contact { friction: 0.4 };
+        island.contacts.constraints.push(constraint);
     }
     island.bodies.push(problem);
     (cache, island)
 }
 
-fn plate() -> Partners {
-    let plate = Partner::Rigid {
+fn plate() -> RigidProxies {
+    let plate = RigidProxy::Rigid {
         com: Vec3::new(0.1, -0.3, 0.05),
         inv_mass: Vec3::repeat(1.0 / 30.0),
         inv_inertia: Mat3::from_diagonal(&Vec3::new(1.0, 0.7, 1.3)),
@@ -359,16 +362,16 @@ fn plate() -> Partners {
         twist: Twist { linear: Vec3::y() * 0.5, angular: Vec3::new(0.1, 0.2, -0.3) },
         free: Twist { linear: Vec3::y() * 0.4, angular: Vec3::new(0.1, 0.2, -0.3) },
     };
-    Partners { list: vec![plate], articulations: Vec::new() }
+    RigidProxies { list: vec![plate], articulations: Vec::new() }
 }
 
 #[test]
 fn impulses_on_the_two_sides_cancel() {
-    let partner = plate();
+    let proxy = plate();
     let (cache, mut island) = touching();
-    island.solve(&cache, &partner, H, &LIMITS);
+    island.solve(&SolveContext { factors: &cache, proxies: &proxy, h: H, limits: &LIMITS });
     let mut reactions = [Reaction::default()];
-    island.contacts.add_reactions(&partner, H, &mut reactions);
+    island.contacts.add_reactions(&proxy, H, &mut reactions);
     let body = &island.bodies[0];
     let gained = (0..body.current.x.len()).map(|i| {
         let mass = 1000.0 * body.model.node_volumes[i];
@@ -383,10 +386,10 @@ fn impulses_on_the_two_sides_cancel() {
 
 #[test]
 fn solved_contacts_obey_signorini_and_coulomb() {
-    let partner = plate();
+    let proxy = plate();
     let (cache, mut island) = touching();
     island.bodies[0].settings = SolverSettings::iterations(100);
-    island.solve(&cache, &partner, H, &LIMITS);
+    island.solve(&SolveContext { factors: &cache, proxies: &proxy, h: H, limits: &LIMITS });
     let contacts: &ContactSystem = &island.contacts;
     let mut carrying = 0;
     for i in 0..contacts.active() {

@@ -1,0 +1,136 @@
+//! A contact as the solver sees it: three constraints (normal and two tangents), or one without friction.
+
+use super::obstacle::ProxyId;
+use crate::body::{ConstraintGeometry, ConstraintKey, ConstraintMemory};
+use crate::math::{Vec3, tangents};
+
+/// One endpoint of a contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Endpoint {
+    /// A point of a body's surface: a weighted sum of up to three nodes.
+    Soft {
+        /// Index of the body in the step's list.
+        body: usize,
+        nodes: [u32; 3],
+        /// Sum to one; zero for nodes that do not count.
+        weights: [f64; 3],
+    },
+    /// A point of a rigid body, at the start of the step \[m\].
+    Rigid { proxy: ProxyId, point: Vec3 },
+    /// The turning of a rigid body: directions are axes then, gaps angles \[rad\] and forces
+    /// moments \[N m\].
+    Rotation { proxy: ProxyId },
+}
+
+/// What forces a constraint may take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Law {
+    /// Pushes, and rubs within the friction cone.
+    Contact { friction: f64 },
+    /// Holds in both directions along the normal, with no more than `limit` \[N\].
+    Bilateral { limit: f64 },
+}
+
+/// A contact. Forces are positive on endpoint 0 and negative on endpoint 1.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Constraint {
+    pub endpoints: [Endpoint; 2],
+    /// Normal, from endpoint 1 to endpoint 0, and two tangents.
+    pub frame: [Vec3; 3],
+    /// Distance along the normal at the start of the step \[m\].
+    pub gap: f64,
+    pub law: Law,
+    /// Displacement per force that the constraint itself gives way by [m/N].
+    pub compliance: f64,
+    pub restitution: f64,
+    pub key: ConstraintKey,
+    /// Force on endpoint 0 in the last step \[N\].
+    pub warm_force: Vec3,
+    /// De Saxcé shift of the last step, per second of it [m/s].
+    pub warm_shift_rate: f64,
+    /// Where it acted in the last step.
+    pub warm_geometry: Option<ConstraintGeometry>,
+    /// What to add to the motion along the normal so that zero is where the step is to end \[m\]: the gap,
+    /// restitution and bounded recovery. The solver's.
+    pub target_gap: f64,
+}
+
+impl Constraint {
+    pub fn new(endpoints: [Endpoint; 2], normal: Vec3, gap: f64, key: ConstraintKey) -> Self {
+        let [t1, t2] = tangents(&normal);
+        Self {
+            endpoints,
+            frame: [normal, t1, t2],
+            gap,
+            law: Law::Contact { friction: 0.0 },
+            compliance: 0.0,
+            restitution: 0.0,
+            key,
+            warm_force: Vec3::zeros(),
+            warm_shift_rate: 0.0,
+            warm_geometry: None,
+            target_gap: gap,
+        }
+    }
+
+    /// Takes up what the last step has left of this contact.
+    pub fn warm_start(&mut self, memory: &ConstraintMemory) {
+        self.warm_force = memory.force;
+        self.warm_shift_rate = memory.shift_rate;
+        self.warm_geometry = Some(memory.geometry);
+    }
+
+    /// Rows of this contact in the solver: three, or one without friction.
+    pub fn dimension(&self) -> usize {
+        match self.law {
+            Law::Contact { friction } if friction > 0.0 => 3,
+            _ => 1,
+        }
+    }
+
+    /// Directions of those constraints.
+    pub fn directions(&self) -> &[Vec3] {
+        &self.frame[..self.dimension()]
+    }
+
+    /// The force in the world of the components `lambda` \[N\].
+    pub fn force(&self, lambda: &[f64]) -> Vec3 {
+        let terms = self.directions().iter().zip(lambda);
+        terms.fold(Vec3::zeros(), |sum, (d, l)| sum + d * *l)
+    }
+}
+
+impl Endpoint {
+    /// A node of the body at a place of the step's list.
+    pub fn node(body: usize, node: u32) -> Self {
+        Self::Soft { body, nodes: [node, 0, 0], weights: [1.0, 0.0, 0.0] }
+    }
+
+    /// Weighted nodes of a soft endpoint; nothing for a proxy.
+    pub fn soft_nodes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let (nodes, weights) = match self {
+            Endpoint::Soft { nodes, weights, .. } => (*nodes, *weights),
+            Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => ([0; 3], [0.0; 3]),
+        };
+        let pairs = nodes.into_iter().zip(weights);
+        pairs.filter(|(_, w)| *w != 0.0).map(|(n, w)| (n as usize, w))
+    }
+
+    /// The rigid proxy of a endpoint that has one.
+    pub fn proxy(&self) -> Option<ProxyId> {
+        match self {
+            Endpoint::Soft { .. } => None,
+            Endpoint::Rigid { proxy, .. } | Endpoint::Rotation { proxy } => Some(*proxy),
+        }
+    }
+
+    /// Whether it is on the soft body at this place.
+    pub fn is_of(&self, place: usize) -> bool {
+        matches!(self, Endpoint::Soft { body, .. } if *body == place)
+    }
+
+    /// Value of a nodal field at a soft endpoint.
+    pub fn interpolate(&self, field: &[Vec3]) -> Vec3 {
+        self.soft_nodes().fold(Vec3::zeros(), |sum, (n, w)| sum + field[n] * w)
+    }
+}

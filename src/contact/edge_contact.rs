@@ -1,0 +1,118 @@
+//! Edges of two surfaces across one another.
+
+use super::soft_surface::{Closing, DEEPEST, STILL_BESIDE, SoftSurface};
+use crate::math::Vec3;
+
+/// What two edges that cross may miss.
+#[derive(Clone, Copy)]
+pub(super) struct Room {
+    /// Part of an edge beyond its ends.
+    beside: f64,
+    /// Angle \[rad\] between the direction across them and the normals at them.
+    askew: f64,
+    /// Sine of the angle below which they count as parallel.
+    crossing: f64,
+}
+
+/// Of edges that did not carry: within a thousandth of an end the node's own constraint serves.
+pub(super) const NEW_EDGES: Room = Room { beside: -1.0e-3, askew: 0.4, crossing: 0.1 };
+/// Of edges that carried in the last step.
+pub(super) const CARRYING_EDGES: Room = Room { beside: STILL_BESIDE, askew: 0.6, crossing: 0.05 };
+
+/// Two edges across one another.
+pub(super) struct Crossing {
+    /// Places on the two edges, 0 at their first nodes.
+    pub places: [f64; 2],
+    /// From the second body to the first.
+    pub normal: Vec3,
+    pub gap: f64,
+    pub closing: Closing,
+}
+
+/// Edges of two bodies that cross within the step, or nearly. Edges of sheets and rods have no outside: they are
+/// on the side of one another where they were `last`, else where they are at the start of the step.
+pub(super) fn crossing(
+    a: &SoftSurface<'_>,
+    ea: usize,
+    b: &SoftSurface<'_>,
+    eb: usize,
+    room: Room,
+    last: Option<Vec3>,
+) -> Option<Crossing> {
+    let ends = |s: &SoftSurface<'_>, e: usize| s.model.surface.edges[e].map(|n| n as usize);
+    let ([i, j], [k, l]) = (ends(a, ea), ends(b, eb));
+    let (p, u) = (a.x[i], a.x[j] - a.x[i]);
+    let (q, v) = (b.x[k], b.x[l] - b.x[k]);
+    let across = u.cross(&v);
+    let length = across.norm();
+    if !(length > room.crossing * u.norm() * v.norm()) {
+        return None;
+    }
+    let normal = across / length;
+    let reach_of = |s: &SoftSurface<'_>, ends: [usize; 2]| {
+        ends.map(|n| s.reach[s.model.surface.index_of_node[n] as usize]).into_iter().fold(0.0, f64::max)
+    };
+    let reach = reach_of(a, [i, j]) + reach_of(b, [k, l]);
+    let deepest = DEEPEST * a.model.surface.mean_edge.min(b.model.surface.mean_edge);
+    let height = normal.dot(&(p - q));
+    if !(height.abs() < reach.max(deepest)) {
+        return None;
+    }
+    // Of what is not there, none.
+    let face = |s: &SoftSurface<'_>, t: u32| s.faces.get(t as usize).copied().unwrap_or_default();
+    let faces = |s: &SoftSurface<'_>, e: usize| s.model.surface.edge_triangles[e].map(|t| face(s, t));
+    let [outward_a, outward_b] = [faces(a, ea), faces(b, eb)];
+    let thin = [a.model.surface.is_thin_edge(ea), b.model.surface.is_thin_edge(eb)];
+    // From b to a: into a, out of b.
+    let towards = match thin {
+        [false, false] => outward_b[0] + outward_b[1] - outward_a[0] - outward_a[1],
+        _ => last.unwrap_or(normal * height),
+    };
+    let sign = if towards.dot(&normal) < 0.0 { -1.0 } else { 1.0 };
+    let (normal, height) = (normal * sign, height * sign);
+    let within = height < reach && height > -deepest;
+    if !within
+        || !(thin[0] || looks_along(a, ea, &outward_a, &-normal, room.askew))
+        || !(thin[1] || looks_along(b, eb, &outward_b, &normal, room.askew))
+    {
+        return None;
+    }
+    let move_of = |s: &SoftSurface<'_>, ends: [usize; 2]| {
+        (s.target[ends[0]] - s.x[ends[0]] + s.target[ends[1]] - s.x[ends[1]]) * 0.5
+    };
+    let way = move_of(a, [i, j]) - move_of(b, [k, l]);
+    let closing = -normal.dot(&way);
+    let closing = Closing::new(height, closing);
+    let when = closing.when;
+    // In the plane of both: p + s u = q + t v.
+    let w = q - p - way * when;
+    let squared = length * length;
+    let s = w.cross(&v).dot(&across) / squared;
+    let t = w.cross(&u).dot(&across) / squared;
+    let inside = |t: f64| t > -room.beside && t < 1.0 + room.beside;
+    let skin = |s: &SoftSurface<'_>, [i, j]: [usize; 2], t: f64| {
+        s.model.half_thickness[i] * (1.0 - t) + s.model.half_thickness[j] * t
+    };
+    let gap = height - skin(a, [i, j], s) - skin(b, [k, l], t);
+    (inside(s) && inside(t)).then_some(Crossing { places: [s, t], normal, gap, closing })
+}
+
+/// Whether a direction across an edge is between the normals of its two triangles, or nearly; of an edge that
+/// is no ridge, nearly their mean.
+fn looks_along(s: &SoftSurface<'_>, edge: usize, outward: &[Vec3; 2], direction: &Vec3, askew: f64) -> bool {
+    let sum = outward[0] + outward[1];
+    let length = sum.norm();
+    if !(length > 0.0) {
+        return false;
+    }
+    let surface = &s.model.surface;
+    let [i, _] = surface.edges[edge].map(|n| s.x[n as usize]);
+    // The second triangle's third corner is below the first one's plane at a ridge.
+    let second = surface.triangles[surface.edge_triangles[edge][1] as usize];
+    let lowest = second.iter().map(|&n| outward[0].dot(&(s.x[n as usize] - i))).fold(0.0, f64::min);
+    let highest = second.iter().map(|&n| outward[0].dot(&(s.x[n as usize] - i))).fold(0.0, f64::max);
+    // The cosine of half the angle between the two normals, and of that and some more.
+    let half = if -lowest > highest { (0.5 * length).min(1.0) } else { 1.0 };
+    let (sin, cos) = askew.sin_cos();
+    direction.dot(&sum) >= length * (half * cos - (1.0 - half * half).sqrt() * sin)
+}

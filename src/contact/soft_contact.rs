@@ -1,0 +1,402 @@
+//! Contacts between the surfaces of two deformable bodies, or of one with itself: nodes on triangles, and
+//! edges across edges.
+//!
+//! Two flat faces on one another touch everywhere at once. What carries are the nodes of the finer one, on
+//! the triangles of the other; where those do not reach, nodes of the other on triangles of the finer one, and
+//! rims across rims.
+//!
+//! What carried in the last step is looked at again, and given more room: on the ridge between two triangles
+//! each pushes the node onto the other, and with one of them at a time the two would take turns for ever.
+
+use super::constraint::{Constraint, Endpoint};
+use super::edge_contact::{CARRYING_EDGES, NEW_EDGES, crossing};
+use super::soft_surface::{Closing, DEEPEST, STILL_BESIDE, SoftPair, SoftSurface, near_in_mesh};
+use super::tangle::{untangle, untangle_itself};
+use super::triangle_contact::barycentric;
+use crate::body::{ConstraintKey, ConstraintMemory, SoftPairContact, SoftPairKind};
+use crate::math::Vec3;
+
+/// Cosine beyond which two surfaces face one another.
+const FACING: f64 = -0.1;
+/// By how much weights may miss a triangle at first; [`STILL_BESIDE`] where contact was.
+const BESIDE: f64 = 0.02;
+/// Cosine beyond which two triangles of one surface are one face.
+const COPLANAR: f64 = 0.9999;
+/// Cosine beyond which two constraints push the same way.
+const PARALLEL: f64 = 0.9;
+/// Depth, in mean edges, of an overlap that another contact of the two has made impossible.
+const LATE: f64 = 2.0;
+
+/// Finds contacts between deformables; holds the memory it needs between calls.
+#[derive(Default)]
+pub(crate) struct SoftDetector {
+    /// Triangles whose boxes meet.
+    pairs: Vec<(u32, u32)>,
+    /// Surface nodes of one body and triangles of the other.
+    on_triangles: [Vec<(u32, u32)>; 2],
+    edges: Vec<(u32, u32)>,
+    /// The contacts that carried in the last step, ascending by their names, with their normals.
+    carried: Vec<(ConstraintKey, Vec3)>,
+    touches: Vec<Touch>,
+    /// When each constraint closes, as part of the step, and how much it closes in all of it \[m\].
+    closings: Vec<Closing>,
+    /// Per surface node: the normal of its constraint, towards its own body.
+    held: [Vec<Option<Vec3>>; 2],
+}
+
+/// A node on a triangle.
+#[derive(Clone, Copy)]
+struct Touch {
+    triangle: usize,
+    weights: [f64; 3],
+    /// Outward of the triangle.
+    normal: Vec3,
+    gap: f64,
+    /// By how much the weights miss the triangle.
+    miss: f64,
+    closing: Closing,
+}
+
+impl SoftDetector {
+    /// Appends the contacts of two bodies to `constraints`: of the first as side 0, of the second as side 1.
+    /// `memory` holds the contacts of the first in the last step.
+    pub fn detect(
+        &mut self,
+        pair: &SoftPair,
+        surfaces: [&SoftSurface<'_>; 2],
+        memory: &[ConstraintMemory],
+        constraints: &mut Vec<Constraint>,
+    ) {
+        let [a, b] = surfaces;
+        self.carried.clear();
+        let between = |m: &&ConstraintMemory| matches!(m.key, ConstraintKey::SoftPair(c) if c.other == b.key);
+        let carried = memory.iter().filter(between).filter(|m| m.force != Vec3::zeros());
+        self.carried.extend(carried.map(|m| (m.key, m.geometry.frame[0])));
+        let itself = a.key == b.key;
+        self.collect(surfaces, itself);
+        for (held, surface) in self.held.iter_mut().zip(surfaces) {
+            held.clear();
+            held.resize(surface.model.surface.nodes.len(), None);
+        }
+        self.closings.clear();
+        let first = constraints.len();
+        let finer = usize::from(b.model.surface.mean_edge < a.model.surface.mean_edge);
+        for side in [finer, 1 - finer] {
+            // One's own surface was listed on both endpoints alike.
+            if !(itself && side != finer) {
+                self.touch(pair, surfaces, side, constraints);
+            }
+        }
+        if itself {
+            let [first, second] = &mut self.held;
+            let (from, to) = if finer == 0 { (first, second) } else { (second, first) };
+            to.clone_from(from);
+        }
+        self.cross(pair, surfaces, constraints);
+        self.drop_late(surfaces, first, constraints);
+        constraints[first..].sort_unstable_by_key(|constraint| constraint.key);
+        if surfaces.iter().all(|s| s.model.surface.is_closed()) {
+            match itself {
+                true => untangle_itself(a, &self.pairs, first, constraints),
+                false => untangle(surfaces, &self.pairs, constraints),
+            }
+        }
+    }
+
+    /// Drops constraints that would close only when the bodies have gone through one another somewhere else: what
+    /// stops them there keeps them from it.
+    fn drop_late(&self, surfaces: [&SoftSurface<'_>; 2], first: usize, constraints: &mut Vec<Constraint>) {
+        let edge = surfaces.iter().map(|s| s.model.surface.mean_edge).fold(f64::INFINITY, f64::min);
+        let earliest = self.closings.iter().map(|c| c.when).fold(1.0, f64::min);
+        let mut closings = self.closings.iter();
+        let mut place = 0;
+        constraints.retain(|_| {
+            place += 1;
+            let own = if place > first { closings.next() } else { None };
+            own.is_none_or(|c| (c.when - earliest) * c.distance < LATE * edge)
+        });
+    }
+
+    /// Lists what is to be looked at closely.
+    fn collect(&mut self, [a, b]: [&SoftSurface<'_>; 2], itself: bool) {
+        self.on_triangles.iter_mut().for_each(Vec::clear);
+        self.edges.clear();
+        let [of_a, of_b] = &mut self.on_triangles;
+        // Every node and every edge is looked at with one of its facets, whose box holds it.
+        let index = |s: &SoftSurface<'_>, n: u32| s.model.surface.index_of_node[n as usize];
+        let at_node =
+            |s: &SoftSurface<'_>, t: u32, n: u32| s.model.surface.node_facet[index(s, n) as usize] == t;
+        let is_triangle = |s: &SoftSurface<'_>, t: u32| (t as usize) < s.model.surface.triangles.len();
+        let on_edge = |s: &SoftSurface<'_>, t: u32, e: u32| {
+            !is_triangle(s, t) || s.model.surface.edge_triangles[e as usize][0] == t
+        };
+        self.pairs.clear();
+        self.pairs.extend(a.tree.pairs(b.tree));
+        for &(ta, tb) in &self.pairs {
+            let (s, t) = (&a.model.surface, &b.model.surface);
+            if is_triangle(b, tb) {
+                let own = s.facet_nodes(ta as usize).iter().filter(|&&n| at_node(a, ta, n));
+                of_a.extend(own.map(|&n| (index(a, n), tb)));
+            }
+            if !itself && is_triangle(a, ta) {
+                let own = t.facet_nodes(tb as usize).iter().filter(|&&n| at_node(b, tb, n));
+                of_b.extend(own.map(|&n| (index(b, n), ta)));
+            }
+            for &ea in s.facet_edges(ta as usize).iter().filter(|&&e| on_edge(a, ta, e)) {
+                let others = t.facet_edges(tb as usize).iter().filter(|&&e| on_edge(b, tb, e));
+                self.edges.extend(others.map(|&eb| (ea, eb)).filter(|(ea, eb)| !itself || ea < eb));
+            }
+        }
+        for list in [of_a, of_b, &mut self.edges] {
+            list.sort_unstable();
+        }
+    }
+
+    /// Nodes of the body on `side` on triangles of the other.
+    fn touch(
+        &mut self,
+        pair: &SoftPair,
+        surfaces: [&SoftSurface<'_>; 2],
+        side: usize,
+        constraints: &mut Vec<Constraint>,
+    ) {
+        let (own, other) = (surfaces[side], surfaces[1 - side]);
+        let itself = own.key == other.key;
+        let list = std::mem::take(&mut self.on_triangles[side]);
+        let mut touches = std::mem::take(&mut self.touches);
+        for near in list.chunk_by(|a, b| a.0 == b.0) {
+            let s = near[0].0 as usize;
+            let node = own.model.surface.nodes[s];
+            let kind = [SoftPairKind::FirstNode, SoftPairKind::SecondNode][side];
+            let other_key = surfaces[1].key;
+            let key = |t: u32| {
+                ConstraintKey::SoftPair(SoftPairContact { other: other_key, second: t, first: node, kind })
+            };
+            touches.clear();
+            // The nearest fresh one, and those of the last step.
+            let mut best: Option<Touch> = None;
+            for &(_, t) in near {
+                if itself && are_neighbours(own, s, t as usize) {
+                    continue;
+                }
+                let last = self.last_normal(&key(t)).map(|normal| if side == 0 { normal } else { -normal });
+                let carried = last.is_some();
+                let room = if carried { STILL_BESIDE } else { BESIDE };
+                let touch = on_triangle(own, s, other, t as usize, room, last);
+                let Some(touch) =
+                    touch.filter(|touch| carried || itself || !self.is_held(touch, other, 1 - side))
+                else {
+                    continue;
+                };
+                if carried {
+                    touches.push(touch);
+                }
+                if touch.miss <= BESIDE && best.is_none_or(|b| touch.gap.abs() < b.gap.abs()) {
+                    best = Some(touch);
+                }
+            }
+            if let Some(best) = best {
+                touches.retain(|t| t.triangle != best.triangle && t.normal.dot(&best.normal) < COPLANAR);
+                touches.push(best);
+            }
+            let Some(last) = touches.last() else { continue };
+            self.held[side][s] = Some(last.normal);
+            for touch in &touches {
+                let own_endpoint =
+                    Endpoint::Soft { body: own.body, nodes: [node, 0, 0], weights: [1.0, 0.0, 0.0] };
+                let nodes = other.model.surface.triangles[touch.triangle];
+                let other_endpoint = Endpoint::Soft { body: other.body, nodes, weights: touch.weights };
+                let (endpoints, normal) = match side {
+                    0 => ([own_endpoint, other_endpoint], touch.normal),
+                    _ => ([other_endpoint, own_endpoint], -touch.normal),
+                };
+                constraints.push(pair.constraint(endpoints, normal, touch.gap, key(touch.triangle as u32)));
+                self.closings.push(touch.closing);
+            }
+        }
+        self.touches = touches;
+        self.on_triangles[side] = list;
+    }
+
+    /// The normal of a contact that carried in the last step.
+    fn last_normal(&self, key: &ConstraintKey) -> Option<Vec3> {
+        let place = self.carried.binary_search_by(|(name, _)| name.cmp(key));
+        place.ok().map(|k| self.carried[k].1)
+    }
+
+    /// Whether the nodes of a triangle have constraints already that keep it from what touches it.
+    fn is_held(&self, touch: &Touch, surface: &SoftSurface<'_>, side: usize) -> bool {
+        surface.model.surface.triangles[touch.triangle].iter().all(|&n| {
+            let index = surface.model.surface.index_of_node[n as usize] as usize;
+            self.held[side][index].is_some_and(|held| held.dot(&touch.normal) < -PARALLEL)
+        })
+    }
+
+    /// Edges across edges.
+    fn cross(&mut self, pair: &SoftPair, surfaces: [&SoftSurface<'_>; 2], constraints: &mut Vec<Constraint>) {
+        let [a, b] = surfaces;
+        let itself = a.key == b.key;
+        for &(ea, eb) in &self.edges {
+            let nodes = [a.model.surface.edges[ea as usize], b.model.surface.edges[eb as usize]];
+            if itself && nodes[0].iter().any(|&n| nodes[1].iter().any(|&m| near_in_mesh(a.model, n, m))) {
+                continue;
+            }
+            let kind = SoftPairKind::Edges;
+            let key = ConstraintKey::SoftPair(SoftPairContact { other: b.key, second: eb, first: ea, kind });
+            let last = self.last_normal(&key);
+            let carried = last.is_some();
+            let room = if carried { CARRYING_EDGES } else { NEW_EDGES };
+            let Some(crossing) = crossing(a, ea as usize, b, eb as usize, room, last) else { continue };
+            let holds = |side: usize| {
+                nodes[side].iter().all(|&n| {
+                    let index = surfaces[side].model.surface.index_of_node[n as usize] as usize;
+                    self.held[side][index].is_some_and(|held| held.dot(&crossing.normal).abs() > PARALLEL)
+                })
+            };
+            if !carried && (holds(0) || holds(1)) {
+                continue;
+            }
+            let soft = |k: usize, body: usize| {
+                let [i, j] = nodes[k];
+                let t = crossing.places[k];
+                Endpoint::Soft { body, nodes: [i, j, 0], weights: [1.0 - t, t, 0.0] }
+            };
+            constraints.push(pair.constraint(
+                [soft(0, a.body), soft(1, b.body)],
+                crossing.normal,
+                crossing.gap,
+                key,
+            ));
+            self.closings.push(crossing.closing);
+        }
+    }
+}
+
+/// Surface node `s` of one body on triangle `t` of another, where it comes to lie within the step, or misses
+/// it by no more than `room`. A sheet's triangle has two endpoints: the node is on that where it was `last`, else where it
+/// is at the start of the step.
+fn on_triangle(
+    own: &SoftSurface<'_>,
+    s: usize,
+    other: &SoftSurface<'_>,
+    t: usize,
+    room: f64,
+    last: Option<Vec3>,
+) -> Option<Touch> {
+    let node = own.model.surface.nodes[s] as usize;
+    let nodes = other.model.surface.triangles[t].map(|n| n as usize);
+    let corners = nodes.map(|n| other.x[n]);
+    let [a, b, c] = corners;
+    let x = own.x[node];
+    let mut normal = other.faces[t];
+    if t >= other.model.surface.closed {
+        let side = last.unwrap_or(x - a);
+        normal *= if normal.dot(&side) < 0.0 { -1.0 } else { 1.0 };
+    }
+    let looks_away = !own.model.surface.is_thin[s] && normal.dot(&own.normals[s]) > FACING;
+    if normal == Vec3::zeros() || looks_away {
+        return None;
+    }
+    let height = normal.dot(&(x - a));
+    let index = |n: usize| other.model.surface.index_of_node[n] as usize;
+    let reach = own.reach[s] + nodes.iter().fold(0.0, |r: f64, &n| r.max(other.reach[index(n)]));
+    if !(height < reach && height > -DEEPEST * other.model.surface.mean_edge) {
+        return None;
+    }
+    // Where the two are when they meet.
+    let way = own.target[node] - x;
+    let ways = nodes.map(|n| other.target[n] - other.x[n]);
+    let closing = normal.dot(&((ways[0] + ways[1] + ways[2]) / 3.0 - way));
+    let closing = Closing::new(height, closing);
+    let when = closing.when;
+    let met = [0, 1, 2].map(|k| corners[k] + ways[k] * when);
+    let weights = barycentric(&met, &(x + way * when))?;
+    let miss = weights.iter().fold(0.0, |miss: f64, w| miss.max(-w));
+    if miss > room {
+        return None;
+    }
+    let weights = weights.map(|w| w.max(0.0));
+    let sum: f64 = weights.iter().sum();
+    let weights = weights.map(|w| w / sum);
+    let foot = a * weights[0] + b * weights[1] + c * weights[2];
+    let skins = nodes.iter().zip(weights).map(|(&n, w)| other.model.half_thickness[n] * w).sum::<f64>();
+    let gap = normal.dot(&(x - foot)) - skins - own.model.half_thickness[node];
+    Some(Touch { triangle: t, weights, normal, gap, miss, closing })
+}
+
+/// Whether a surface node and a triangle of the same body are too near in the mesh to touch.
+fn are_neighbours(s: &SoftSurface<'_>, node: usize, triangle: usize) -> bool {
+    let node = s.model.surface.nodes[node];
+    s.model.surface.triangles[triangle].iter().any(|&n| near_in_mesh(s.model, node, n))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::surface_tree::SurfaceTree;
+    use crate::fem::DeformableModel;
+    use crate::math::{rotation_from_vector, to_real};
+    use crate::mesh::TetMesh;
+    use parry3d::math::Pose;
+    use parry3d::query::{PointQuery, distance};
+    use parry3d::shape::{Segment, Triangle};
+    use proptest::prelude::*;
+
+    fn vector(size: f64) -> impl Strategy<Value = Vec3> {
+        [-size..size, -size..size, -size..size].prop_map(Vec3::from)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn nodes_and_edges_that_are_near_are_listed_and_no_others(
+            shift in vector(0.35), turn in vector(3.0), margin in 0.005..0.05f64,
+        ) {
+            let model = DeformableModel::new(&TetMesh::cuboid([0.2, 0.15, 0.1], [3, 2, 2]).unwrap());
+            let moved: Vec<Vec3> =
+                model.rest.iter().map(|x| rotation_from_vector(&turn) * x + shift).collect();
+            let x = [&model.rest, &moved];
+            let trees = x.map(|x| {
+                let mut tree = SurfaceTree::default();
+                tree.update(&model, x, x, margin);
+                tree
+            });
+            let surface = |k: usize| SoftSurface {
+                body: k, key: k as u64, model: &model, x: x[k], target: x[k],
+                faces: &[], normals: &[], reach: &[], tree: &trees[k],
+            };
+            let mut detector = SoftDetector::default();
+            detector.collect([&surface(0), &surface(1)], false);
+            let at = |k: usize, n: u32| to_real(&x[k][n as usize]);
+            let mesh = &model.surface;
+            // Two boxes with the margin around each meet within √3 of twice the margin along their
+            // diagonal; triangles reach no farther than their longest edge from a corner of theirs.
+            let longest = mesh.edges.iter().map(|e| (model.rest[e[0] as usize] - model.rest[e[1] as usize]).norm());
+            let far = (3.5 * margin + 2.0 * longest.fold(0.0, f64::max)) as f32;
+            for side in 0..2 {
+                let list = &detector.on_triangles[side];
+                prop_assert!(list.windows(2).all(|w| w[0] < w[1]), "once each");
+                for (s, &n) in mesh.nodes.iter().enumerate() {
+                    for (t, triangle) in mesh.triangles.iter().enumerate() {
+                        let [a, b, c] = triangle.map(|n| at(1 - side, n));
+                        let gap = Triangle::new(a, b, c).distance_to_local_point(at(side, n), true);
+                        let listed = list.binary_search(&(s as u32, t as u32)).is_ok();
+                        prop_assert!(listed || f64::from(gap) > 2.0 * margin);
+                        prop_assert!(!listed || gap < far);
+                    }
+                }
+            }
+            prop_assert!(detector.edges.windows(2).all(|w| w[0] < w[1]), "once each");
+            let segment = |k: usize, e: usize| Segment::new(at(k, mesh.edges[e][0]), at(k, mesh.edges[e][1]));
+            for ea in 0..mesh.edges.len() {
+                for eb in 0..mesh.edges.len() {
+                    let gap =
+                        distance(&Pose::IDENTITY, &segment(0, ea), &Pose::IDENTITY, &segment(1, eb)).unwrap().distance;
+                    let listed = detector.edges.binary_search(&(ea as u32, eb as u32)).is_ok();
+                    prop_assert!(listed || f64::from(gap) > 2.0 * margin);
+                    prop_assert!(!listed || gap < far);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! The finite-element kernel: what a body is made of, and the energy, forces and tangents of that.
+//!
+//! Architecture invariant: nothing here knows a body's state beyond the positions it is given.
+
+mod elements;
+mod smoothing;
+mod thin_structure;
+
+mod model;
+
+mod gradients;
+
+pub(crate) mod elastic_forces;
+mod thin_elements;
+
+mod frames;
+
+pub(crate) mod constant_matrix;
+mod tangents;
+
+pub use constant_matrix::SystemMatrix;
+pub(crate) use frames::{floating_frame, node_rotations, volume};
+pub use model::DeformableModel;
+pub(crate) use model::{Build, Elements};
+pub(crate) use tangents::add_tangents;

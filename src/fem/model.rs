@@ -1,0 +1,306 @@
+//! The constant part of a body: rest mesh, elements, surface, node order.
+
+use super::elements::{ElementBlock, Stencil, TriangleElement};
+use super::smoothing::SmoothingDomains;
+use super::thin_structure::ThinElements;
+use crate::material::DeformableMaterial;
+use crate::math::Vec3;
+use crate::math::lanes::LANES;
+use crate::mesh::{MeshError, Structure, Surface, TetMesh, node_adjacency, sweep_order};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Everything about a body that its motion and its material do not change. Made once per mesh and
+/// shared by all bodies of that shape through an [`Arc`](std::sync::Arc): they also share factors.
+#[derive(Clone, Debug)]
+pub struct DeformableModel {
+    /// Names the model in caches.
+    pub(crate) id: u64,
+    /// Rest positions \[m\].
+    pub(crate) rest: Vec<Vec3>,
+    /// Nodes of each tetrahedron, in the order of `blocks`.
+    pub(crate) tetrahedra: Vec<[u32; 4]>,
+    /// The tetrahedra again, four at a time, as the element loops want them.
+    pub(crate) blocks: Vec<ElementBlock>,
+    /// In the place of `blocks`, the domains of smoothed tetrahedra: around edges for the shape, around nodes for
+    /// the volume.
+    pub(crate) domains: SmoothingDomains,
+    pub(crate) volume_domains: SmoothingDomains,
+    /// Triangles of sheets.
+    pub(crate) triangles: Vec<TriangleElement>,
+    /// What keeps lengths: springs, rods, hinges of sheets, muscle fibres.
+    pub(crate) stencils: Vec<Stencil>,
+    /// Distance of the surface from each node \[m\]: half the thickness of a sheet, the radius of a rod.
+    pub(crate) half_thickness: Vec<f64>,
+    /// Each node's share of the volume of the elements around it: a quarter of a tetrahedron's \[m³\].
+    pub(crate) node_volumes: Vec<f64>,
+    /// Nodes that share an element with each node, ascending, itself left out.
+    pub(crate) adjacency: Vec<Vec<u32>>,
+    /// Nodes that belong to no tetrahedron, each with the nearest one that does.
+    pub(crate) frame_sources: Vec<(u32, u32)>,
+    /// Nodes that each node has a block of the matrix with: as `adjacency`, unless smoothed.
+    pub(crate) coupling: Vec<Vec<u32>>,
+    /// The boundary.
+    pub(crate) surface: Surface,
+    /// Extent of the rest shape: diagonal of its bounding box \[m\].
+    pub(crate) size: f64,
+    /// Volume at rest \[m³\].
+    pub(crate) volume: f64,
+    node_of_vertex: Vec<u32>,
+    vertex_of_node: Vec<u32>,
+}
+
+/// What the elastic energy of a body is made of.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Elements<'a> {
+    pub model: &'a DeformableModel,
+    pub material: &'a DeformableMaterial,
+    /// Stretch that muscle fibres want to have.
+    pub activation: f64,
+}
+
+/// What a body is made of, as far as settings depend on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Build {
+    /// Tetrahedra, with or without anything else.
+    Solid,
+    /// Sheets or springs.
+    Sheet,
+    /// Nothing but rods.
+    Rope,
+}
+
+static NEXT_ID: AtomicU64 = AtomicU64::new(1);
+
+impl DeformableModel {
+    /// Prepares a mesh for simulation.
+    pub fn new(mesh: &TetMesh) -> Self {
+        Self::of(&Structure::solid(mesh))
+    }
+
+    /// Prepares a structure for simulation: tetrahedra, sheets, rods and springs in any mix.
+    ///
+    /// # Errors
+    /// [`MeshError::UnusedVertex`] for a vertex without mass, [`MeshError::Empty`].
+    pub fn from_structure(structure: &Structure) -> Result<Self, MeshError> {
+        structure.check()?;
+        Ok(Self::of(structure))
+    }
+
+    /// The same with muscle fibres in its tetrahedra: `direction` tells their direction at a point of the rest
+    /// shape \[m\]; where that is zero or no number there are none. See
+    /// [`DeformableMaterial::fibre_modulus`](crate::DeformableMaterial::fibre_modulus).
+    pub fn with_fibres(mut self, direction: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
+        self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
+        for tet in &self.tetrahedra {
+            let middle = tet.iter().map(|&n| self.rest[n as usize]).sum::<Vec3>() / 4.0;
+            let along = Vec3::from(direction(middle.into()));
+            if let Some(along) = along.try_normalize(0.0).filter(|a| a.iter().all(|c| c.is_finite())) {
+                let block = ElementBlock::new(&[*tet], &self.rest);
+                let volume = crate::mesh::signed_volume(&tet.map(|n| self.rest[n as usize]));
+                self.stencils.push(Stencil::fibre(*tet, &block.shape_gradients(0), volume, &along));
+            }
+        }
+        self
+    }
+
+    /// The same with its tetrahedra smoothed over their edges and nodes [Liu et al. 2009; He et al. 2013]: they do not
+    /// lock, in bending and near incompressibility, as linear tetrahedra do, whose stiffness falls to the
+    /// true one only with the mesh. Elements cost three times as much, and the factor is twice as large:
+    /// worth it wherever the mesh is coarse. What it gains is in the README.
+    pub fn smoothed(mut self) -> Self {
+        if !self.is_solid() {
+            return self;
+        }
+        self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
+        let tetrahedra = self.shaped_tetrahedra();
+        let (around_edges, around_nodes) =
+            (SmoothingDomains::around_edges(tetrahedra.clone()), SmoothingDomains::around_nodes(tetrahedra));
+        (self.domains, self.volume_domains) = (around_edges, around_nodes);
+        let mut domains: Vec<Vec<u32>> = Vec::new();
+        self.domains.for_each(|nodes, _, _| domains.push(nodes.to_vec()));
+        let stencils = self.stencils.iter().map(|s| &s.nodes[..]);
+        let thin = self.triangles.iter().map(|t| &t.nodes[..]).chain(stencils);
+        let solid = self.tetrahedra.iter().map(|t| &t[..]).chain(domains.iter().map(|p| &p[..]));
+        self.coupling = node_adjacency(solid.chain(thin), self.rest.len());
+        self
+    }
+
+    /// Of a structure in which every vertex has mass.
+    fn of(structure: &Structure) -> Self {
+        let at_rest: Vec<Vec3> = structure.vertices.iter().map(|&v| v.into()).collect();
+        let vertex_of_node = sweep_order(&at_rest);
+        let mut node_of_vertex = vec![0; at_rest.len()];
+        for (node, &vertex) in vertex_of_node.iter().enumerate() {
+            node_of_vertex[vertex as usize] = node as u32;
+        }
+        let rest: Vec<Vec3> = vertex_of_node.iter().map(|&v| at_rest[v as usize]).collect();
+        let node = |v: u32| node_of_vertex[v as usize];
+        let mut tetrahedra: Vec<[u32; 4]> = structure.tetrahedra.iter().map(|t| t.map(node)).collect();
+        // Neighbouring elements touch neighbouring memory.
+        tetrahedra.sort_by_key(|t| t.iter().sum::<u32>());
+        let mut node_volumes = vec![0.0; rest.len()];
+        let mut volume = 0.0;
+        for tet in &tetrahedra {
+            let own = crate::mesh::signed_volume(&tet.map(|n| rest[n as usize]));
+            tet.iter().for_each(|&n| node_volumes[n as usize] += own / 4.0);
+            volume += own;
+        }
+        let thin = ThinElements::new(structure, node, &tetrahedra, &rest, &mut node_volumes);
+        volume += thin.volume;
+        let sheets: Vec<[u32; 3]> = thin.triangles.iter().map(|t| t.nodes).collect();
+        let surface = Surface::new(&tetrahedra, &sheets, &thin.segments, &rest);
+        let low = rest.iter().fold(rest[0], |a, b| a.inf(b));
+        let high = rest.iter().fold(rest[0], |a, b| a.sup(b));
+        let solid: &[[u32; 4]] = if structure.is_network { &[] } else { &tetrahedra };
+        let thin_nodes = thin.triangles.iter().map(|t| &t.nodes[..]);
+        let thin_nodes = thin_nodes.chain(thin.stencils.iter().map(|s| &s.nodes[..]));
+        let adjacency = node_adjacency(tetrahedra.iter().map(|t| &t[..]).chain(thin_nodes), rest.len());
+        Self {
+            id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
+            blocks: solid.chunks(LANES).map(|c| ElementBlock::new(c, &rest)).collect(),
+            frame_sources: frame_sources(&adjacency, solid),
+            coupling: adjacency.clone(),
+            adjacency,
+            volume,
+            size: (high - low).norm(),
+            rest,
+            domains: SmoothingDomains::default(),
+            volume_domains: SmoothingDomains::default(),
+            triangles: thin.triangles,
+            stencils: thin.stencils,
+            half_thickness: thin.half_thickness,
+            tetrahedra,
+            node_volumes,
+            surface,
+            node_of_vertex,
+            vertex_of_node,
+        }
+    }
+
+    /// Whether it is a solid, altogether or in part.
+    pub fn is_solid(&self) -> bool {
+        !self.blocks.is_empty()
+    }
+
+    /// Nodes, gradients of the shape functions, and volumes of the tetrahedra that have an energy.
+    fn shaped_tetrahedra(&self) -> impl Iterator<Item = ([u32; 4], [Vec3; 4], f64)> + Clone + '_ {
+        let solid = self.tetrahedra.iter().enumerate().take(LANES * self.blocks.len());
+        solid.map(|(e, tet)| {
+            let block = &self.blocks[e / LANES];
+            (*tet, block.shape_gradients(e % LANES), block.volumes.0[e % LANES])
+        })
+    }
+
+    /// Calls `with` with the nodes, the gradients of their shape functions [1/m] and the volume \[m³\] of every
+    /// solid element: tetrahedra, or the domains around edges that stand for them.
+    pub(crate) fn for_each_solid(&self, mut with: impl FnMut(&[u32], &[Vec3], f64)) {
+        if self.is_smoothed() {
+            return self.domains.for_each(with);
+        }
+        for (nodes, gradients, volume) in self.shaped_tetrahedra() {
+            with(&nodes, &gradients, volume);
+        }
+    }
+
+    /// Whether its tetrahedra are smoothed over their edges.
+    pub fn is_smoothed(&self) -> bool {
+        self.domains.count > 0
+    }
+
+    /// What it is made of.
+    pub(crate) fn build(&self) -> Build {
+        match (self.is_solid(), self.surface.triangles.is_empty()) {
+            (true, _) => Build::Solid,
+            (false, false) => Build::Sheet,
+            (false, true) => Build::Rope,
+        }
+    }
+
+    /// Number of vertices.
+    pub fn vertex_count(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// Number of tetrahedra.
+    pub fn tetrahedron_count(&self) -> usize {
+        self.tetrahedra.len()
+    }
+
+    /// The largest distance of the surface from its nodes \[m\].
+    pub(crate) fn skin(&self) -> f64 {
+        self.half_thickness.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Rest position of a vertex \[m\].
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    pub fn rest_position(&self, vertex: usize) -> [f64; 3] {
+        self.rest[self.node_of_vertex[vertex] as usize].into()
+    }
+
+    /// Volume at rest \[m³\].
+    pub fn volume(&self) -> f64 {
+        self.volume
+    }
+
+    /// Vertices of the triangles of the surface: those around tetrahedra first, wound outward, then those of sheets.
+    pub fn surface_triangles(&self) -> impl ExactSizeIterator<Item = [u32; 3]> + '_ {
+        let vertex = |n: u32| self.vertex_of_node[n as usize];
+        self.surface.triangles.iter().map(move |t| t.map(vertex))
+    }
+
+    /// Bytes of the constant data: mesh, gradients, surface, orders.
+    pub fn memory(&self) -> usize {
+        use std::mem::size_of_val;
+        size_of_val(&self.rest[..])
+            + size_of_val(&self.tetrahedra[..])
+            + size_of_val(&self.blocks[..])
+            + size_of_val(&self.triangles[..])
+            + size_of_val(&self.stencils[..])
+            + 2 * size_of_val(&self.node_volumes[..])
+            + self.adjacency.iter().chain(&self.coupling).map(|a| 24 + 4 * a.len()).sum::<usize>()
+            + self.domains.bytes()
+            + self.volume_domains.bytes()
+            + size_of_val(&self.surface.triangles[..]) * 2
+            + size_of_val(&self.surface.edges[..])
+            + 12 * self.rest.len()
+    }
+
+    /// The node of a vertex, if there is such a vertex.
+    pub(crate) fn node(&self, vertex: usize) -> Option<usize> {
+        self.node_of_vertex.get(vertex).map(|&n| n as usize)
+    }
+
+    /// The vertex of a node.
+    pub(crate) fn vertex(&self, node: usize) -> usize {
+        self.vertex_of_node[node] as usize
+    }
+
+    /// Nodes in the order of the user's vertices.
+    pub(crate) fn nodes_by_vertex(&self) -> impl ExactSizeIterator<Item = usize> + '_ {
+        self.node_of_vertex.iter().map(|&n| n as usize)
+    }
+}
+
+/// Nodes without tetrahedra with the nearest, by edges, of those with some.
+fn frame_sources(adjacency: &[Vec<u32>], tetrahedra: &[[u32; 4]]) -> Vec<(u32, u32)> {
+    let mut source = vec![u32::MAX; adjacency.len()];
+    tetrahedra.iter().flatten().for_each(|&n| source[n as usize] = n);
+    let mut front: Vec<u32> = (0..source.len() as u32).filter(|&n| source[n as usize] == n).collect();
+    let mut found = Vec::new();
+    while !front.is_empty() {
+        let mut next = Vec::new();
+        for &n in &front {
+            for &other in &adjacency[n as usize] {
+                if source[other as usize] == u32::MAX {
+                    source[other as usize] = source[n as usize];
+                    found.push((other, source[n as usize]));
+                    next.push(other);
+                }
+            }
+        }
+        front = next;
+    }
+    found
+}

@@ -1,0 +1,165 @@
+//! What there is around the bodies: obstacles, contacts, attachments, and what else holds the rigid bodies.
+
+use super::quarantine::quarantine;
+use super::scratch::StepScratch;
+use super::threads::for_each;
+use super::work::BodyWork;
+use crate::body::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet};
+use crate::contact::Endpoint;
+use crate::coupling::{StepContext, SteppedBodies, WalkContext, attachment_constraints, prescribed_nodes};
+
+impl StepScratch {
+    pub(super) fn read_obstacles(&mut self, context: &StepContext<'_>) {
+        self.scene.read(context);
+        self.candidates.update(&self.scene.obstacles);
+        self.counters.obstacles = self.scene.obstacles.len();
+    }
+
+    pub(super) fn wake(&mut self, deformables: &mut DeformableBodySet, context: &StepContext<'_>) {
+        self.sleeping.wake(deformables, &self.scene, &self.candidates, context);
+    }
+
+    /// Adds the bodies that are awake to the step; `recovery` \[m\] is how far overlaps are undone in it.
+    pub(super) fn predict(
+        &mut self,
+        deformables: &mut DeformableBodySet,
+        context: &StepContext<'_>,
+        recovery: f64,
+    ) {
+        for (handle, body) in deformables.iter_mut() {
+            if !body.is_enabled() {
+                continue;
+            }
+            if !body.state.is_finite() {
+                if let Some(work) = self.idle.get(&handle) {
+                    work.roll_back(body);
+                }
+                quarantine(body, &mut self.counters);
+                continue;
+            }
+            if body.is_sleeping() {
+                self.counters.sleeping += 1;
+                continue;
+            }
+            self.activate(handle);
+        }
+        self.prescribed.clear();
+        prescribed_nodes(deformables, &mut self.scene, context, recovery, &mut self.prescribed);
+        self.predict_from(0, deformables, context);
+    }
+
+    fn activate(&mut self, handle: DeformableBodyHandle) {
+        let work = self.idle.remove(&handle);
+        let mut work = work.unwrap_or_else(|| BodyWork::new(handle));
+        work.index = self.works.len();
+        self.works.push(work);
+    }
+
+    /// Tells the bodies from place `first` on what attachments prescribe, and where they go without contact.
+    fn predict_from(&mut self, first: usize, deformables: &DeformableBodySet, context: &StepContext<'_>) {
+        for work in &mut self.works[first..] {
+            let own = self.prescribed.iter().filter(|(body, _)| *body == work.handle);
+            work.prescribed.clear();
+            work.prescribed.extend(own.map(|(_, node)| *node));
+        }
+        for_each(&mut self.works[first..], |work| {
+            work.predict(&deformables[work.handle], context.h, &context.gravity);
+        });
+    }
+
+    /// Finds the contacts of the bodies from place `first` on with rigid ones.
+    pub(super) fn detect(
+        &mut self,
+        deformables: &DeformableBodySet,
+        context: &StepContext<'_>,
+        first: usize,
+    ) {
+        let (scene, candidates) = (&self.scene, &self.candidates);
+        for_each(&mut self.works[first..], |work| {
+            let body = &deformables[work.handle];
+            work.detect(body, scene, candidates, context.sets);
+            work.look_ahead(body, scene, candidates);
+        });
+    }
+
+    /// Finds contacts between deformables; those that sleep and are touched wake, until there are no more.
+    pub(super) fn detect_soft_pairs(
+        &mut self,
+        deformables: &mut DeformableBodySet,
+        context: &StepContext<'_>,
+    ) {
+        loop {
+            self.soft_pairs.find(&mut self.works, deformables);
+            if self.soft_pairs.woken.is_empty() {
+                break;
+            }
+            let first = self.works.len();
+            self.soft_pairs.woken.iter().for_each(|handle| deformables[*handle].wake_up());
+            self.sleeping.wake_together(deformables);
+            let awake = deformables.iter().filter(|(_, body)| body.is_enabled() && !body.is_sleeping());
+            for (handle, _) in awake {
+                if self.works[..first].iter().all(|work| work.handle != handle) {
+                    self.activate(handle);
+                    self.counters.sleeping -= 1;
+                }
+            }
+            self.predict_from(first, deformables, context);
+            self.detect(deformables, context, first);
+        }
+        // What is left belongs to bodies that sleep, were removed or disabled.
+        self.idle.clear();
+        self.linking.clear();
+        self.soft_pairs.add_constraints(&self.works, deformables, &mut self.linking);
+        let counters = &mut self.counters;
+        counters.bodies = self.works.len();
+        counters.pairs = self.soft_pairs.pair_count() + self.works.iter().map(|w| w.pairs).sum::<usize>();
+        counters.contacts =
+            self.linking.len() + self.works.iter().map(|w| w.constraints.len()).sum::<usize>();
+    }
+
+    /// Adds the constraints of the attachments.
+    pub(super) fn attach(&mut self, deformables: &DeformableBodySet, context: &StepContext<'_>) {
+        self.works.iter_mut().for_each(|work| work.linked_nodes.clear());
+        let stepped = Stepped(&self.works);
+        attachment_constraints(deformables, &mut self.scene, context, &stepped, &mut self.linking);
+        // Between nodes that are prescribed and what does not yield there is nothing to solve for.
+        let (works, proxies) = (&self.works, &self.scene.proxies);
+        self.linking.retain(|constraint| {
+            let stays = |endpoint: &Endpoint| match endpoint {
+                Endpoint::Soft { body, .. } => works[*body].is_fully_pinned(endpoint),
+                Endpoint::Rigid { proxy, .. } | Endpoint::Rotation { proxy } => !proxies.yields(*proxy),
+            };
+            !constraint.endpoints.iter().all(stays)
+        });
+        for endpoint in self.linking.iter().flat_map(|constraint| &constraint.endpoints) {
+            if let Endpoint::Soft { body, .. } = endpoint {
+                let nodes = endpoint.soft_nodes().map(|(node, _)| node as u32);
+                self.works[*body].linked_nodes.extend(nodes);
+            }
+        }
+    }
+
+    /// Finds what else holds the rigid bodies that deformable ones touch, through at most `limit` of them.
+    pub(super) fn walk_neighbourhood(&mut self, context: &StepContext<'_>, limit: usize) {
+        let constraints = self.works.iter().flat_map(|work| &work.constraints).chain(&self.linking);
+        let endpoints = constraints.flat_map(|constraint| &constraint.endpoints);
+        let touched = endpoints.filter_map(|endpoint| endpoint.proxy());
+        let (scene, candidates) = (&mut self.scene, &self.candidates);
+        let mut around = WalkContext { scene, candidates, context: *context, limit };
+        self.neighbourhood.walk(&mut around, touched);
+        self.counters.neighbourhood_constraints = self.neighbourhood.constraints.len();
+    }
+}
+
+/// The step's list, as attachments ask it.
+struct Stepped<'a>(&'a [BodyWork]);
+
+impl SteppedBodies for Stepped<'_> {
+    fn place_of(&self, body: DeformableBodyHandle) -> Option<usize> {
+        self.0.iter().position(|work| work.handle == body)
+    }
+
+    fn is_prescribed(&self, place: usize, node: u32, by: DeformableAttachmentHandle) -> bool {
+        self.0[place].is_prescribed(node, by)
+    }
+}

@@ -1,0 +1,74 @@
+//! The integration order of every body, its factor, and the islands that are solved together.
+
+use super::quarantine::quarantine;
+use super::scratch::StepScratch;
+use crate::body::DeformableBodySet;
+use crate::contact::Endpoint;
+use crate::coupling::StepContext;
+
+impl StepScratch {
+    /// Bodies that are touched go on by implicit Euler.
+    pub(super) fn choose_integration_order(
+        &mut self,
+        deformables: &DeformableBodySet,
+        context: &StepContext<'_>,
+    ) {
+        for work in self.works.iter_mut().filter(|work| work.is_touched()) {
+            if let Some(problem) = &mut work.problem {
+                problem.begin_first_order(&deformables[work.handle], &context.gravity);
+            }
+        }
+    }
+
+    pub(super) fn prepare_factors(&mut self, deformables: &mut DeformableBodySet, column_budget: usize) {
+        self.factors.begin_step(column_budget);
+        let (factors, counters) = (&mut self.factors, &mut self.counters);
+        let count = self.works.len();
+        self.works.retain_mut(|work| {
+            let (Some(problem), Some(body)) = (&work.problem, deformables.get_mut(work.handle)) else {
+                return false;
+            };
+            // Numbers beyond what double precision can factor: stiffness over inertia of 1e15 and more.
+            let Some(done) = factors.prepare(&problem.key, body, problem.h(), work.touched_nodes()) else {
+                quarantine(body, counters);
+                return false;
+            };
+            counters.factorizations += done.factorizations;
+            counters.columns += done.columns + factors.prepare_ahead(done.id, &problem.key.pins, &work.ahead);
+            work.set_factor(done.id);
+            true
+        });
+        if self.works.len() < count {
+            self.move_up(count);
+        }
+        self.counters.factor_bytes = self.factors.factor_bytes();
+        self.counters.column_bytes = self.factors.column_bytes();
+    }
+
+    /// Constraints name bodies by their places in the step's list, which had `count` of them before some were put aside.
+    fn move_up(&mut self, count: usize) {
+        let mut places = vec![None; count];
+        self.works.iter().enumerate().for_each(|(place, work)| places[work.index] = Some(place));
+        self.linking.retain_mut(|constraint| {
+            constraint.endpoints.iter_mut().all(|endpoint| match endpoint {
+                Endpoint::Soft { body, .. } => places[*body].map(|place| *body = place).is_some(),
+                Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => true,
+            })
+        });
+        for (place, work) in self.works.iter_mut().enumerate() {
+            work.move_to(place);
+        }
+    }
+
+    pub(super) fn form_islands(&mut self, deformables: &DeformableBodySet) {
+        let (works, links) = (&mut self.works, &mut self.neighbourhood.constraints);
+        links.append(&mut self.linking);
+        self.counters.islands = self.grouping.form(works, links, &self.scene.proxies, &mut self.islands);
+        for work in &mut self.islands {
+            for member in 0..work.members.len() {
+                let handle = self.works[work.members[member]].handle;
+                work.warm_start_links(deformables[handle].state());
+            }
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! The end of a step: the bodies store what was solved, and those that have been still fall asleep.
+
+use super::quarantine::quarantine;
+use super::readout::{add_attachment_forces, list_contacts, list_pair_contacts, list_rigid_forces};
+use super::scratch::StepScratch;
+use super::sleeping::LookAround;
+use super::work::IslandWork;
+use crate::body::{
+    DeformableAttachment, DeformableBody, DeformableBodySet, DeformableState, Integrator, is_number,
+};
+use crate::coupling::StepContext;
+use crate::pipeline::DeformableCounters;
+use crate::solver::{BodyProblem, ROUNDING, Reaction};
+use rapier3d::math::Vector;
+
+impl StepScratch {
+    pub(super) fn advance(&mut self, deformables: &mut DeformableBodySet, h: f64) {
+        deformables.reset_attachment_forces();
+        self.reaction_list.clear();
+        self.reaction_list.resize(self.scene.proxies.list.len(), Reaction::default());
+        for work in &mut self.islands {
+            let finite = work.is_finite();
+            for (local, &index) in work.members.iter().enumerate() {
+                let handle = self.works[index].handle;
+                let Some(body) = deformables.get_mut(handle) else { continue };
+                if finite {
+                    store(body, work, local, h, &mut self.counters);
+                    let problem = &work.island.bodies[local];
+                    body.report.is_rejected = problem.is_rejected;
+                    self.works[index].tunnelling.stop(body, problem.is_rejected, h);
+                    self.counters.rejected_steps += usize::from(problem.is_rejected);
+                    give_forces(&work.island.bodies[local], deformables);
+                } else if !work.island.bodies[local].current.x.iter().all(is_number) {
+                    quarantine(body, &mut self.counters);
+                }
+            }
+            if finite {
+                let contacts = &work.island.contacts;
+                contacts.add_reactions(&self.scene.proxies, h, &mut self.reaction_list);
+                let handle_of = |local: usize| self.works[work.members[local]].handle;
+                list_contacts(work, handle_of, &mut self.contacts);
+                list_pair_contacts(work, handle_of, &mut self.pair_contacts);
+                add_attachment_forces(work, deformables);
+                list_rigid_forces(work, &mut self.rigid_contacts, &mut self.joint_forces);
+            }
+            for (problem, &index) in work.island.bodies.drain(..).zip(&work.members) {
+                self.works[index].problem = Some(problem);
+            }
+        }
+        deformables.attachments_mut().for_each(DeformableAttachment::end_step);
+        let forces = self.contacts.iter().map(|c| c.force).chain(self.pair_contacts.iter().map(|c| c.force));
+        self.counters.active_contacts = forces.filter(|force| *force != Vector::ZERO).count();
+        self.idle.extend(self.works.drain(..).map(|work| (work.handle, work)));
+    }
+
+    /// Lets islands fall asleep that have been still.
+    pub(super) fn fall_asleep(&mut self, deformables: &mut DeformableBodySet, context: &StepContext<'_>) {
+        self.sleeping.rigid.clear();
+        for island in &self.islands {
+            self.slept.clear();
+            self.slept.extend(island.handles.iter().copied());
+            for handle in &self.slept {
+                if let Some(body) = deformables.get_mut(*handle) {
+                    body.count_stillness(context.h);
+                }
+            }
+            let around = LookAround { scene: &self.scene, candidates: &self.candidates, context };
+            self.sleeping.fall_asleep(island, &self.slept, deformables, &around);
+        }
+    }
+}
+
+/// Stores what became of the body `local` of an island in a step of `h` \[s\].
+pub(super) fn store(
+    body: &mut DeformableBody,
+    work: &IslandWork,
+    local: usize,
+    h: f64,
+    counters: &mut DeformableCounters,
+) {
+    let problem = &work.island.bodies[local];
+    body.state.history.clear();
+    if problem.settings.integrator == Integrator::Bdf2 && work.island.contacts.is_empty() {
+        let DeformableState { x, v, history, .. } = &mut body.state;
+        history.h = h;
+        history.x.clone_from(x);
+        history.v.clone_from(v);
+    }
+    let in_flight = work.island.contacts.active() == 0;
+    problem.final_velocities(in_flight, &mut body.state.v);
+    body.state.x.clone_from(&problem.current.x);
+    let share = problem.pin_share();
+    for pin in &mut body.pins {
+        pin.force = problem.pin_force(pin.node, &share);
+    }
+    work.memory_of(local, h, &mut body.state.contacts);
+    body.state.shared.clear();
+    if local == 0 {
+        work.memory_of_links(h, &mut body.state.shared);
+    }
+    body.report.iterations = work.island.report.iterations;
+    body.report.residual = problem.residual();
+    body.report.tolerance = problem.settings.tolerance.max(ROUNDING) * problem.force_scale();
+    body.report.guard_retries = problem.guard_retries;
+    counters.guard_retries += problem.guard_retries;
+    counters.not_converged += usize::from(!body.last_converged());
+}
+
+/// Gives attachments the forces with which they hold nodes of a body.
+pub(super) fn give_forces(problem: &BodyProblem, deformables: &mut DeformableBodySet) {
+    if problem.prescribed.is_empty() {
+        return;
+    }
+    let share = problem.pin_share();
+    for node in &problem.prescribed {
+        if let Some(attachment) = deformables.attachment_mut(node.attachment) {
+            attachment.force += problem.pin_force(node.node, &share);
+        }
+    }
+}

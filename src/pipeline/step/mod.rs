@@ -1,0 +1,30 @@
+//! The step, told as a list of verbs.
+//!
+//! ```text
+//! read_obstacles → wake → predict → detect → detect_soft_pairs → attach → walk_neighbourhood →
+//! choose_integration_order → prepare_factors → form_islands → solve → stop_tunnelling → advance → fall_asleep →
+//! hand over reactions → (rapier steps) → after_step
+//! ```
+
+mod threads;
+
+mod quarantine;
+mod tunnelling;
+
+mod work;
+
+mod islands;
+mod readout;
+mod sleeping;
+mod soft_pairs;
+
+mod scratch;
+
+mod detect;
+mod factors;
+mod finish;
+mod solve;
+
+mod run;
+
+pub(super) use scratch::StepScratch;

@@ -1,0 +1,102 @@
+//! What users can read of a step, gathered from the islands.
+
+use super::work::IslandWork;
+use crate::body::{
+    ConstraintKey, DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet, JointRole,
+};
+use crate::contact::Endpoint;
+use crate::coupling::{body_handle, collider_handle, impulse_joint_handle};
+use crate::math::{Vec3, to_real};
+use crate::pipeline::{DeformableContact, DeformablePairContact, JointForce, RigidContact, SolvedJoint};
+
+/// Gives attachments the forces of their constraints.
+pub(super) fn add_attachment_forces(work: &IslandWork, deformables: &mut DeformableBodySet) {
+    let system = &work.island.contacts;
+    for (i, constraint) in system.constraints.iter().enumerate() {
+        let ConstraintKey::Attachment(axis) = constraint.key else { continue };
+        let handle = DeformableAttachmentHandle(axis.attachment);
+        if let Some(attachment) = deformables.attachment_mut(handle) {
+            attachment.force += system.force(i);
+        }
+    }
+}
+
+/// Lists what the constraints between rigid bodies carry.
+pub(super) fn list_rigid_forces(
+    work: &IslandWork,
+    contacts: &mut Vec<RigidContact>,
+    joints: &mut Vec<JointForce>,
+) {
+    let system = &work.island.contacts;
+    for (i, constraint) in system.constraints.iter().enumerate() {
+        let force = system.force(i);
+        let (joint, axis) = match constraint.key {
+            ConstraintKey::Joint(axis) => (SolvedJoint::Impulse(impulse_joint_handle(axis.joint)), axis),
+            ConstraintKey::MultibodyJoint(axis) => (SolvedJoint::Multibody(body_handle(axis.joint)), axis),
+            ConstraintKey::RigidPair(key) => {
+                let Endpoint::Rigid { point, .. } = &constraint.endpoints[0] else { continue };
+                let [collider1, collider2] = key.colliders.map(collider_handle);
+                let (point, normal) = (to_real(point), to_real(&constraint.frame[0]));
+                contacts.push(RigidContact { collider1, collider2, point, normal, force: to_real(&force) });
+                continue;
+            }
+            ConstraintKey::Obstacle(_) | ConstraintKey::SoftPair(_) | ConstraintKey::Attachment(_) => {
+                continue;
+            }
+        };
+        let along = force.dot(&constraint.frame[0]);
+        // Upper limits are constraints along the reversed axis.
+        let force = if axis.role == JointRole::UpperLimit { -along } else { along };
+        joints.push(JointForce { joint, axis: axis.axis as usize, role: axis.role, force });
+    }
+}
+
+/// Lists the contacts of the bodies of an island.
+pub(super) fn list_contacts(
+    work: &IslandWork,
+    handle_of: impl Fn(usize) -> DeformableBodyHandle,
+    contacts: &mut Vec<DeformableContact>,
+) {
+    let system = &work.island.contacts;
+    for (i, constraint) in system.constraints.iter().enumerate() {
+        let [Endpoint::Soft { body, .. }, Endpoint::Rigid { point, .. }] = &constraint.endpoints else {
+            continue;
+        };
+        let ConstraintKey::Obstacle(key) = constraint.key else { continue };
+        let normal: &Vec3 = &constraint.frame[0];
+        contacts.push(DeformableContact {
+            body: handle_of(*body),
+            collider: collider_handle(key.collider),
+            point: to_real(point),
+            normal: to_real(normal),
+            force: to_real(&system.force(i)),
+            gap: system.final_gap(i),
+        });
+    }
+}
+
+/// Lists the contacts between the bodies of an island.
+pub(super) fn list_pair_contacts(
+    work: &IslandWork,
+    handle_of: impl Fn(usize) -> DeformableBodyHandle,
+    contacts: &mut Vec<DeformablePairContact>,
+) {
+    let system = &work.island.contacts;
+    for (i, constraint) in
+        system.constraints.iter().enumerate().filter(|(_, constraint)| constraint.key.is_soft_pair())
+    {
+        let [Endpoint::Soft { body: first, .. }, Endpoint::Soft { body: second, .. }] = constraint.endpoints
+        else {
+            continue;
+        };
+        let point = constraint.endpoints[0].interpolate(&work.island.bodies[first].current.x);
+        contacts.push(DeformablePairContact {
+            body1: handle_of(first),
+            body2: handle_of(second),
+            point: to_real(&point),
+            normal: to_real(&constraint.frame[0]),
+            force: to_real(&system.force(i)),
+            gap: system.final_gap(i),
+        });
+    }
+}

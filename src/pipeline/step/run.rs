@@ -1,0 +1,73 @@
+//! The verbs in their order.
+
+use super::scratch::StepScratch;
+use crate::body::{DeformableBody, DeformableBodySet};
+use crate::coupling::{PhysicsParts, StepContext};
+use crate::math::from_real;
+use crate::pipeline::{DeformableCounters, DeformableParameters};
+use crate::profiler::Stopwatch;
+
+impl StepScratch {
+    /// Steps all bodies and hands rapier what they do to its bodies.
+    pub fn run(
+        &mut self,
+        parameters: &DeformableParameters,
+        deformables: &mut DeformableBodySet,
+        parts: &mut PhysicsParts<'_>,
+    ) {
+        self.counters = DeformableCounters::default();
+        self.rigid_contacts.clear();
+        self.joint_forces.clear();
+        // If the last step was not ended by `after_step`, the users' forces are still ours to return.
+        self.reactions.take_back(parts);
+        let (gravity, dt) = (parts.gravity, parts.dt);
+        if !(dt.is_finite() && dt > 0.0 && gravity.is_finite()) {
+            self.contacts.clear();
+            self.pair_contacts.clear();
+            self.counters.skipped = true;
+            return;
+        }
+        let context = StepContext { sets: parts.sets(), gravity: from_real(gravity), h: f64::from(dt) };
+        self.solve_bodies(parameters, deformables, &context);
+        let mut clock = Stopwatch::start();
+        let asleep = &self.sleeping.rigid;
+        self.reactions.write(parts, &self.scene, &self.reaction_list, &self.neighbourhood, asleep);
+        self.counters.advance_time += clock.lap();
+    }
+
+    fn solve_bodies(
+        &mut self,
+        parameters: &DeformableParameters,
+        deformables: &mut DeformableBodySet,
+        context: &StepContext<'_>,
+    ) {
+        let limits = parameters.contact_limits();
+        let mut clock = Stopwatch::start();
+        self.read_obstacles(context);
+        self.wake(deformables, context);
+        self.predict(deformables, context, limits.recovery_speed * context.h);
+        self.detect(deformables, context, 0);
+        self.detect_soft_pairs(deformables, context);
+        self.keep_contacts_of_sleepers(deformables);
+        self.attach(deformables, context);
+        self.walk_neighbourhood(context, parameters.neighbourhood_bodies);
+        self.counters.detection_time = clock.lap();
+        self.choose_integration_order(deformables, context);
+        self.prepare_factors(deformables, parameters.column_budget);
+        self.form_islands(deformables);
+        self.counters.factor_time = clock.lap();
+        self.solve(&limits, context.h);
+        self.counters.solve_time = clock.lap();
+        self.stop_tunnelling(&limits, context.h);
+        self.advance(deformables, context.h);
+        self.fall_asleep(deformables, context);
+        self.counters.advance_time = clock.lap();
+    }
+
+    /// What touches a sleeping body goes on to do so.
+    fn keep_contacts_of_sleepers(&mut self, deformables: &DeformableBodySet) {
+        let sleeps = |body| deformables.get(body).is_some_and(DeformableBody::is_sleeping);
+        self.contacts.retain(|c| sleeps(c.body));
+        self.pair_contacts.retain(|c| sleeps(c.body1) && sleeps(c.body2));
+    }
+}

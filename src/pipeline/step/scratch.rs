@@ -1,0 +1,43 @@
+//! What a step works in: memory and caches, nothing that results depend on.
+
+use super::islands::Grouping;
+use super::sleeping::Sleeping;
+use super::soft_pairs::SoftPairDetection;
+use super::work::{BodyWork, IslandWork};
+use crate::body::{DeformableBodyHandle, PrescribedNode};
+use crate::contact::{Candidates, Constraint};
+use crate::coupling::{RapierScene, Reactions, RigidNeighbourhood};
+use crate::pipeline::{
+    DeformableContact, DeformableCounters, DeformablePairContact, JointForce, RigidContact,
+};
+use crate::solver::{FactorCache, Reaction};
+use std::collections::HashMap;
+
+/// The memory of a pipeline.
+#[derive(Default)]
+pub(in crate::pipeline) struct StepScratch {
+    pub(super) scene: RapierScene,
+    pub(super) candidates: Candidates,
+    /// Work of bodies between steps.
+    pub(super) idle: HashMap<DeformableBodyHandle, BodyWork>,
+    /// Of the bodies that are stepped.
+    pub(super) works: Vec<BodyWork>,
+    pub(in crate::pipeline) factors: FactorCache,
+    pub(super) islands: Vec<IslandWork>,
+    pub(super) grouping: Grouping,
+    pub(super) neighbourhood: RigidNeighbourhood,
+    pub(super) sleeping: Sleeping,
+    pub(super) slept: Vec<DeformableBodyHandle>,
+    pub(super) soft_pairs: SoftPairDetection,
+    /// Nodes that attachments prescribe.
+    pub(super) prescribed: Vec<(DeformableBodyHandle, PrescribedNode)>,
+    /// Constraints of attachments and of contacts between deformables.
+    pub(super) linking: Vec<Constraint>,
+    pub(super) reaction_list: Vec<Reaction>,
+    pub(in crate::pipeline) reactions: Reactions,
+    pub(in crate::pipeline) contacts: Vec<DeformableContact>,
+    pub(in crate::pipeline) pair_contacts: Vec<DeformablePairContact>,
+    pub(in crate::pipeline) rigid_contacts: Vec<RigidContact>,
+    pub(in crate::pipeline) joint_forces: Vec<JointForce>,
+    pub(in crate::pipeline) counters: DeformableCounters,
+}

@@ -1,0 +1,159 @@
+//! Who sleeps and who wakes.
+
+use super::work::IslandWork;
+use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Surroundings, TIME_UNTIL_SLEEP};
+use crate::contact::{Candidates, Law};
+use crate::coupling::{RapierScene, RapierSets, StepContext};
+use crate::math::{Pose64, Vec3};
+use rapier3d::dynamics::{RigidBody, RigidBodyHandle};
+
+/// Where a body looks around.
+pub(super) struct LookAround<'a> {
+    pub scene: &'a RapierScene,
+    pub candidates: &'a Candidates,
+    pub context: &'a StepContext<'a>,
+}
+
+/// Memory for looking around.
+#[derive(Default)]
+pub(super) struct Sleeping {
+    near: Vec<u32>,
+    now: Surroundings,
+    wake: Vec<DeformableBodyHandle>,
+    /// Rigid bodies that fall asleep with the soft ones in this step.
+    pub rigid: Vec<RigidBodyHandle>,
+}
+
+impl Sleeping {
+    /// Wakes bodies whose attachments were changed, or are to a rigid body that is awake.
+    fn wake_attached(&mut self, deformables: &mut DeformableBodySet, sets: RapierSets<'_>) {
+        self.wake.clear();
+        for attachment in deformables.attachments_mut() {
+            self.wake.extend(attachment.take_changed().into_iter().flatten());
+            if attachment.is_broken() || attachment.rigid().is_none() {
+                continue;
+            }
+            let rigid = attachment.rigid().and_then(|handle| sets.bodies.get(handle));
+            // Moved by its user, or gone.
+            let moved = attachment.notice(rigid.map(|body| Pose64::from_real(body.position())));
+            let moves = |body: &RigidBody| {
+                let led = body.is_kinematic() && body.next_position() != body.position();
+                led || body.is_moving() && !body.is_sleeping()
+            };
+            if moved || rigid.is_some_and(moves) {
+                self.wake.push(attachment.body());
+            }
+        }
+        self.wake_listed(deformables);
+    }
+
+    /// Wakes bodies that are tied to one that is awake, or fell asleep touching one that is not asleep any
+    /// more.
+    pub fn wake_together(&mut self, deformables: &mut DeformableBodySet) {
+        loop {
+            self.wake.clear();
+            for (_, attachment) in deformables.attachments().filter(|(_, a)| !a.is_broken()) {
+                let [Some(one), Some(other)] = attachment.bodies() else { continue };
+                let (Some(a), Some(b)) = (deformables.get(one), deformables.get(other)) else { continue };
+                if a.is_enabled() && b.is_enabled() && a.is_sleeping() != b.is_sleeping() {
+                    self.wake.push(if a.is_sleeping() { one } else { other });
+                }
+            }
+            for (handle, body) in deformables.iter() {
+                let Some(around) = &body.state.sleep.surroundings else { continue };
+                let sleeps = |mate| deformables.get(mate).is_some_and(|b| b.is_enabled() && b.is_sleeping());
+                if !around.mate.is_none_or(sleeps) {
+                    self.wake.push(handle);
+                }
+            }
+            if self.wake.is_empty() {
+                return;
+            }
+            self.wake_listed(deformables);
+        }
+    }
+
+    fn wake_listed(&mut self, deformables: &mut DeformableBodySet) {
+        for handle in &self.wake {
+            if let Some(body) = deformables.get_mut(*handle).filter(|body| body.is_sleeping()) {
+                body.wake_up();
+            }
+        }
+    }
+
+    /// Wakes whoever has a reason to: a changed attachment, anything around it that is not as it was when
+    /// it fell asleep, a tie to a body that is awake, a touching body that woke or went.
+    pub fn wake(
+        &mut self,
+        deformables: &mut DeformableBodySet,
+        scene: &RapierScene,
+        candidates: &Candidates,
+        context: &StepContext<'_>,
+    ) {
+        let around = LookAround { scene, candidates, context };
+        self.wake_attached(deformables, context.sets);
+        for (_, body) in deformables.iter_mut().filter(|(_, body)| body.is_enabled() && body.is_sleeping()) {
+            self.look_around(body, &around);
+            let before = body.state.sleep.surroundings.as_ref();
+            if !before.is_some_and(|before| before.is_around(&self.now)) {
+                body.wake_up();
+            }
+        }
+        self.wake_together(deformables);
+    }
+
+    fn look_around(&mut self, body: &DeformableBody, around: &LookAround<'_>) {
+        let LookAround { scene, candidates, context } = around;
+        candidates.around(&body.state.x, &mut self.near);
+        self.now.obstacles.clear();
+        for obstacle in self.near.iter().map(|&o| &scene.obstacles[o as usize]) {
+            self.now.obstacles.push((obstacle.key, obstacle.part, obstacle.start));
+        }
+        self.now.obstacles.sort_unstable_by_key(|(key, part, _)| (*key, *part));
+        (self.now.gravity, self.now.dt) = (context.gravity, context.h);
+    }
+
+    /// Lets an island fall asleep of which every part has been still for long enough.
+    pub fn fall_asleep(
+        &mut self,
+        island: &IslandWork,
+        handles: &[DeformableBodyHandle],
+        deformables: &mut DeformableBodySet,
+        around: &LookAround<'_>,
+    ) {
+        let LookAround { scene, context, .. } = around;
+        let rested = |h: &DeformableBodyHandle| {
+            deformables.get(*h).is_some_and(|b| b.state.sleep.still_for >= TIME_UNTIL_SLEEP)
+        };
+        if !handles.iter().all(rested) {
+            return;
+        }
+        let first = self.rigid.len();
+        let contacts = &island.island.contacts;
+        // What is only about to meet another rigid body stays awake.
+        let touching = |i: &usize| {
+            let constraint = &contacts.constraints[*i];
+            let between_rigid = constraint.key.is_shared() && matches!(constraint.law, Law::Contact { .. });
+            !between_rigid || contacts.force(*i) != Vec3::zeros()
+        };
+        let constraints = (0..contacts.constraints.len()).filter(touching).map(|i| &contacts.constraints[i]);
+        for endpoint in constraints.flat_map(|constraint| &constraint.endpoints) {
+            let Some(proxy) = endpoint.proxy().filter(|p| scene.proxies.yields(*p)) else { continue };
+            let Some(handle) = scene.handles[proxy.0 as usize] else { continue };
+            if !scene.is_still(context.sets, handle) {
+                self.rigid.truncate(first);
+                return;
+            }
+            if !self.rigid[first..].contains(&handle) {
+                self.rigid.push(handle);
+            }
+        }
+        for (k, handle) in handles.iter().enumerate() {
+            let Some(body) = deformables.get_mut(*handle) else { continue };
+            self.look_around(body, around);
+            let mate = handles[(k + 1) % handles.len()];
+            self.now.mate = (mate != *handle).then_some(mate);
+            body.fall_asleep(self.now.clone());
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! Deformable bodies that come near one another, and the contacts between them.
+
+use super::threads::for_each;
+use super::work::BodyWork;
+use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet};
+use crate::contact::{Constraint, Endpoint, SoftDetector, SoftPair};
+use crate::coupling::combined_between;
+use parry3d::bounding_volume::{Aabb, BoundingVolume};
+use std::collections::HashMap;
+
+/// Pairs of bodies and memory for finding them.
+#[derive(Default)]
+pub(super) struct SoftPairDetection {
+    /// Boxes of the bodies with their places: those that are stepped first, then those that sleep.
+    boxes: Vec<(Aabb, usize)>,
+    /// Bodies that sleep beside others, as obstacles until they are woken.
+    dormant: Vec<BodyWork>,
+    /// Those of the last step, for their memory.
+    memory: HashMap<DeformableBodyHandle, BodyWork>,
+    /// The pairs of this step first, then memory for more.
+    pairs: Vec<PairDetection>,
+    count: usize,
+    /// Bodies attached to one another, which do not collide.
+    attached: Vec<[DeformableBodyHandle; 2]>,
+    /// Sleeping bodies that were touched.
+    pub woken: Vec<DeformableBodyHandle>,
+}
+
+/// Two bodies, or one with itself.
+#[derive(Default)]
+struct PairDetection {
+    /// Places, the older handle first.
+    ends: [usize; 2],
+    pair: SoftPair,
+    detector: SoftDetector,
+    constraints: Vec<Constraint>,
+}
+
+impl SoftPairDetection {
+    /// Finds the contacts between the bodies being stepped and with those that sleep; the latter are listed
+    /// in `woken`.
+    pub fn find(&mut self, works: &mut [BodyWork], deformables: &DeformableBodySet) {
+        self.woken.clear();
+        self.update_boxes(works, deformables);
+        self.find_pairs(works, deformables);
+        for work in works.iter_mut() {
+            work.has_neighbours = false;
+        }
+        for end in self.pairs[..self.count].iter().flat_map(|pair| pair.ends) {
+            match works.get_mut(end) {
+                Some(work) => work.has_neighbours = true,
+                None => self.dormant[end - works.len()].has_neighbours = true,
+            }
+        }
+        for_each(works, |work| work.update_tree(&deformables[work.handle]));
+        for_each(&mut self.dormant, |work| work.update_tree(&deformables[work.handle]));
+        let (works, dormant) = (&*works, &self.dormant);
+        let work = |place: usize| works.get(place).unwrap_or_else(|| &dormant[place - works.len()]);
+        let surface = |place: usize| work(place).surface(place, &deformables[work(place).handle]);
+        for_each(&mut self.pairs[..self.count], |pair| {
+            let [a, b] = pair.ends.map(surface);
+            let memory = &deformables[work(pair.ends[0]).handle].state.contacts;
+            pair.constraints.clear();
+            pair.detector.detect(&pair.pair, [&a, &b], memory, &mut pair.constraints);
+            // Between pinned nodes there is nothing to solve for.
+            let held = |endpoint: &Endpoint| match endpoint {
+                Endpoint::Soft { body, .. } => work(*body).is_fully_pinned(endpoint),
+                Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => true,
+            };
+            pair.constraints.retain(|constraint| !constraint.endpoints.iter().all(held));
+        });
+        for pair in self.pairs[..self.count].iter().filter(|pair| !pair.constraints.is_empty()) {
+            let sleeping = pair.ends.iter().filter_map(|end| end.checked_sub(works.len()));
+            self.woken.extend(sleeping.map(|place| dormant[place].handle));
+        }
+        self.woken.sort_unstable();
+        self.woken.dedup();
+    }
+
+    /// Appends the contacts that were found last, with what bodies remember of them.
+    pub fn add_constraints(
+        &self,
+        works: &[BodyWork],
+        deformables: &DeformableBodySet,
+        constraints: &mut Vec<Constraint>,
+    ) {
+        // Pairs with a body that sleeps on have no constraints.
+        for pair in self.pairs[..self.count].iter().filter(|pair| !pair.constraints.is_empty()) {
+            let body = &deformables[works[pair.ends[0]].handle];
+            constraints.extend(pair.constraints.iter().map(|constraint| {
+                let mut constraint = constraint.clone();
+                if let Some(memory) = body.state.contact(&constraint.key) {
+                    constraint.warm_start(memory);
+                }
+                constraint
+            }));
+        }
+    }
+
+    /// Number of pairs looked at closely.
+    pub fn pair_count(&self) -> usize {
+        self.count
+    }
+
+    /// Boxes of all bodies that are stepped, and of those that sleep beside them.
+    fn update_boxes(&mut self, works: &[BodyWork], deformables: &DeformableBodySet) {
+        self.boxes.clear();
+        self.boxes.extend(works.iter().enumerate().map(|(place, work)| (work.extent, place)));
+        self.memory.extend(self.dormant.drain(..).map(|work| (work.handle, work)));
+        let Some(all) = self.boxes.iter().map(|(aabb, _)| *aabb).reduce(|a, b| a.merged(&b)) else { return };
+        for (handle, body) in deformables.iter().filter(|(_, b)| b.is_enabled() && b.is_sleeping()) {
+            if body.aabb().loosened(BodyWork::margin(body)).intersects(&all) {
+                let mut work = self.memory.remove(&handle).unwrap_or_else(|| BodyWork::new(handle));
+                work.survey(body);
+                self.boxes.push((work.extent, works.len() + self.dormant.len()));
+                self.dormant.push(work);
+            }
+        }
+        self.memory.clear();
+    }
+
+    /// Pairs of bodies whose boxes meet, by a sweep along x.
+    fn find_pairs(&mut self, works: &[BodyWork], deformables: &DeformableBodySet) {
+        self.attached.clear();
+        for (_, attachment) in deformables.attachments().filter(|(_, a)| !a.is_broken()) {
+            if let [Some(one), Some(other)] = attachment.bodies() {
+                self.attached.push([one.min(other), one.max(other)]);
+            }
+        }
+        self.attached.sort_unstable();
+        self.boxes.sort_unstable_by(|a, b| a.0.mins.x.total_cmp(&b.0.mins.x).then(a.1.cmp(&b.1)));
+        let dormant = &self.dormant;
+        let handle = |place: usize| match works.get(place) {
+            Some(work) => work.handle,
+            None => dormant[place - works.len()].handle,
+        };
+        self.count = 0;
+        let (pairs, count) = (&mut self.pairs, &mut self.count);
+        let mut add = |ends: [usize; 2], pair: SoftPair| {
+            if *count == pairs.len() {
+                pairs.push(PairDetection::default());
+            }
+            (pairs[*count].ends, pairs[*count].pair) = (ends, pair);
+            *count += 1;
+        };
+        for (i, (aabb, place)) in self.boxes.iter().enumerate() {
+            let own = &deformables[handle(*place)];
+            if own.self_contact() && *place < works.len() {
+                add([*place; 2], pair_of(own, own));
+            }
+            let near = self.boxes[i + 1..].iter().take_while(|(other, _)| other.mins.x <= aabb.maxs.x);
+            for (_, other) in near.filter(|(other, _)| other.intersects(aabb)) {
+                let mut ends = [*place, *other];
+                if ends.iter().all(|end| *end >= works.len()) {
+                    continue;
+                }
+                ends.sort_unstable_by_key(|end| handle(*end));
+                let handles = ends.map(handle);
+                let [a, b] = handles.map(|h| &deformables[h]);
+                let collide = a.collision_groups().test(b.collision_groups());
+                if collide && self.attached.binary_search(&handles).is_err() {
+                    add(ends, pair_of(a, b));
+                }
+            }
+        }
+        self.pairs[..self.count].sort_unstable_by_key(|pair| pair.ends.map(handle));
+    }
+}
+
+fn pair_of(a: &DeformableBody, b: &DeformableBody) -> SoftPair {
+    let (friction, restitution) = combined_between(a, b);
+    SoftPair { friction, restitution }
+}

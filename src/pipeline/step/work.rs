@@ -1,0 +1,323 @@
+//! What the pipeline keeps per body from step to step: memory only, nothing that results depend on.
+
+use super::tunnelling::TunnellingStops;
+use crate::body::{
+    ConstraintMemory, DeformableAttachmentHandle, DeformableBody, DeformableBodyHandle, DeformableState,
+    PrescribedNode, is_number,
+};
+use crate::contact::{
+    Candidates, Constraint, Detector, Endpoint, Pair, STATIC_MARGIN, SoftSurface, SurfaceTree,
+};
+use crate::coupling::{RapierScene, RapierSets, combined, packed};
+use crate::math::Vec3;
+use crate::solver::{BodyProblem, FactorId, Island};
+use parry3d::bounding_volume::Aabb;
+
+/// One body within a step.
+pub(super) struct BodyWork {
+    pub handle: DeformableBodyHandle,
+    /// Place in the step's list.
+    pub index: usize,
+    /// `None` while an island has it.
+    pub problem: Option<BodyProblem>,
+    pub constraints: Vec<Constraint>,
+    pub pairs: usize,
+    detector: Detector,
+    near: Vec<u32>,
+    /// Obstacles that the body may touch in this step.
+    met: Vec<u32>,
+    /// Surface nodes in the order in which they are expected to touch.
+    pub ahead: Vec<u32>,
+    distances: Vec<(f32, u32)>,
+    /// Nodes that attachments and contacts with other deformables act on.
+    pub linked_nodes: Vec<u32>,
+    /// Nodes that attachments prescribe.
+    pub prescribed: Vec<PrescribedNode>,
+    /// Box around all that the body may touch over the step.
+    pub extent: Aabb,
+    /// Other deformables are near, or the body may touch itself.
+    pub has_neighbours: bool,
+    tree: SurfaceTree,
+    pub tunnelling: TunnellingStops,
+}
+
+/// How far a body that touches nothing looks ahead \[s\].
+const LOOK_AHEAD: f64 = 0.5;
+
+impl BodyWork {
+    pub fn new(handle: DeformableBodyHandle) -> Self {
+        Self {
+            handle,
+            index: 0,
+            problem: None,
+            constraints: Vec::new(),
+            pairs: 0,
+            detector: Detector::default(),
+            near: Vec::new(),
+            met: Vec::new(),
+            ahead: Vec::new(),
+            distances: Vec::new(),
+            linked_nodes: Vec::new(),
+            prescribed: Vec::new(),
+            extent: Aabb::new_invalid(),
+            has_neighbours: false,
+            tree: SurfaceTree::default(),
+            tunnelling: TunnellingStops::default(),
+        }
+    }
+
+    /// Distance within which a body looks for contacts even without motion \[m\].
+    pub fn margin(body: &DeformableBody) -> f32 {
+        (STATIC_MARGIN * body.model.surface.mean_edge + body.model.skin()) as f32
+    }
+
+    /// Takes a sleeping body in as an obstacle.
+    pub fn survey(&mut self, body: &DeformableBody) {
+        let (model, x) = (&body.model, &body.state.x);
+        self.detector.begin(model, x, x);
+        self.extent = self.detector.aabb(model, x);
+    }
+
+    /// Brings the tree over the surface up to date, if it is wanted.
+    pub fn update_tree(&mut self, body: &DeformableBody) {
+        if self.has_neighbours {
+            let target = self.problem.as_ref().map_or(&body.state.x, |problem| &problem.target);
+            self.tree.update(&body.model, &body.state.x, target, Self::margin(body).into());
+        }
+    }
+
+    /// The surface over the step, of the body at `place` of the step's list.
+    pub fn surface<'a>(&'a self, place: usize, body: &'a DeformableBody) -> SoftSurface<'a> {
+        SoftSurface {
+            body: place,
+            key: packed(self.handle.into_raw_parts()),
+            model: &body.model,
+            x: &body.state.x,
+            target: self.problem.as_ref().map_or(&body.state.x, |problem| &problem.target),
+            faces: &self.detector.faces,
+            normals: &self.detector.normals,
+            reach: &self.detector.reach,
+            tree: &self.tree,
+        }
+    }
+
+    /// Whether all nodes of a endpoint are pinned.
+    pub fn is_fully_pinned(&self, endpoint: &Endpoint) -> bool {
+        let pins = self.problem.as_ref().map(|problem| &problem.key.pins);
+        endpoint.soft_nodes().all(|(node, _)| pins.is_some_and(|p| p.binary_search(&(node as u32)).is_ok()))
+    }
+
+    /// Whether an attachment prescribes a node for the step.
+    pub fn is_prescribed(&self, node: u32, by: DeformableAttachmentHandle) -> bool {
+        let prescribed = self.problem.as_ref().map_or(&[][..], |problem| &problem.prescribed);
+        let place = prescribed.binary_search_by_key(&node, |p| p.node);
+        place.is_ok_and(|place| prescribed[place].attachment == by)
+    }
+
+    /// Takes the body in: inertial target, masses, damping.
+    pub fn predict(&mut self, body: &DeformableBody, h: f64, gravity: &Vec3) {
+        match &mut self.problem {
+            Some(problem) if problem.model.id == body.model.id => {
+                problem.begin(body, h, gravity, &self.prescribed)
+            }
+            problem => *problem = Some(BodyProblem::new(body, h, gravity, &self.prescribed)),
+        }
+    }
+
+    /// Puts a body whose state is no number back to where its last step left it.
+    pub fn roll_back(&self, body: &mut DeformableBody) {
+        let Some(problem) = self.problem.as_ref().filter(|p| p.model.id == body.model.id) else { return };
+        if !problem.current.x.iter().all(is_number) {
+            return;
+        }
+        let DeformableState { x, v, contacts, shared, history, .. } = &mut body.state;
+        history.clear();
+        for (i, (new, old)) in problem.current.x.iter().zip(&problem.x_start).enumerate() {
+            (x[i], v[i]) = (*new, (new - old) / problem.h());
+        }
+        contacts.clear();
+        shared.clear();
+    }
+
+    /// Finds the body's contacts.
+    pub fn detect(
+        &mut self,
+        body: &DeformableBody,
+        scene: &RapierScene,
+        candidates: &Candidates,
+        sets: RapierSets<'_>,
+    ) {
+        self.constraints.clear();
+        self.met.clear();
+        self.pairs = 0;
+        let Some(problem) = &self.problem else { return };
+        let (model, x) = (&problem.model, &body.state.x);
+        self.detector.begin(model, x, &problem.target);
+        self.extent = self.detector.aabb(model, x);
+        candidates.near(&self.extent, &mut self.near);
+        for &o in &self.near {
+            let collider = sets.colliders.get(scene.colliders[o as usize]);
+            let Some((friction, restitution)) = collider.and_then(|c| combined(body, c)) else {
+                continue;
+            };
+            self.met.push(o);
+            let obstacle = &scene.obstacles[o as usize];
+            let pair = Pair { body: self.index, friction, restitution };
+            self.pairs += 1;
+            let memory = body.state.contacts_with(obstacle.key, obstacle.part);
+            self.detector.detect(&pair, obstacle, model, x, memory, &mut self.constraints);
+        }
+        let mut constraints = std::mem::take(&mut self.constraints);
+        constraints.retain_mut(|constraint| {
+            // Between a pinned node and what does not yield there is nothing to solve for.
+            let pinned = self.is_fully_pinned(&constraint.endpoints[0]);
+            let yields = |endpoint: &Endpoint| endpoint.proxy().is_some_and(|id| scene.proxies.yields(id));
+            if let Some(memory) = body.state.contact(&constraint.key) {
+                constraint.warm_start(memory);
+            }
+            !pinned || constraint.endpoints.iter().any(yields)
+        });
+        constraints.sort_unstable_by_key(|constraint| constraint.key);
+        self.tunnelling.begin(&constraints);
+        self.constraints = constraints;
+    }
+
+    /// Looks for obstacles that a body that touches nothing yet is about to detect_soft_pairs, and lists its surface
+    /// nodes by their distance from those.
+    pub fn look_ahead(&mut self, body: &DeformableBody, scene: &RapierScene, candidates: &Candidates) {
+        self.ahead.clear();
+        let Some(problem) = self.problem.as_ref().filter(|_| self.constraints.is_empty()) else { return };
+        let x = &body.state.x;
+        let mean = body.state.v.iter().sum::<Vec3>() / x.len() as f64;
+        let points = problem.model.surface.nodes.iter().map(|&n| x[n as usize]);
+        let shift = mean * LOOK_AHEAD;
+        candidates.on_the_way(&scene.obstacles, points, &shift, &mut self.near, &mut self.distances);
+        self.ahead.extend(self.distances.iter().map(|(_, s)| *s));
+    }
+
+    /// Finds what has come into obstacles without a contact in a step of `h` \[s\]; returns the energy \[J\] that it
+    /// takes to stop it.
+    pub fn find_tunnelling(&mut self, problem: &mut BodyProblem, scene: &RapierScene, h: f64) -> f64 {
+        let obstacles = self.met.iter().map(|&o| &scene.obstacles[o as usize]);
+        let solid = obstacles.filter(|o| !scene.proxies.yields(o.proxy));
+        self.tunnelling.find(problem, solid, h)
+    }
+
+    /// Takes another place in the step's list.
+    pub fn move_to(&mut self, place: usize) {
+        self.index = place;
+        for endpoint in self.constraints.iter_mut().flat_map(|constraint| &mut constraint.endpoints) {
+            if let Endpoint::Soft { body, .. } = endpoint {
+                *body = place;
+            }
+        }
+    }
+
+    /// Whether anything may touch the body in this step, or holds it.
+    pub fn is_touched(&self) -> bool {
+        !(self.constraints.is_empty() && self.linked_nodes.is_empty() && self.prescribed.is_empty())
+    }
+
+    /// Tells where the body's factor is kept in this step.
+    pub fn set_factor(&mut self, id: FactorId) {
+        if let Some(problem) = &mut self.problem {
+            problem.factor = id;
+        }
+    }
+
+    /// Surface nodes (as indices into the model's list) that the contacts act on.
+    pub fn touched_nodes(&self) -> impl Iterator<Item = u32> + '_ {
+        let nodes = self
+            .constraints
+            .iter()
+            .flat_map(|constraint| constraint.endpoints[0].soft_nodes())
+            .map(|(node, _)| node);
+        let index = self.problem.as_ref().map(|p| &p.model.surface.index_of_node);
+        let linked_nodes = self.linked_nodes.iter().map(|node| *node as usize);
+        nodes.chain(linked_nodes).filter_map(move |node| Some(index?[node]))
+    }
+}
+
+/// An island with the places of its bodies in the step's list.
+#[derive(Default)]
+pub(super) struct IslandWork {
+    pub island: Island,
+    pub members: Vec<usize>,
+    pub handles: Vec<DeformableBodyHandle>,
+}
+
+impl IslandWork {
+    /// Adds the problem and the constraints of the body at `index` of the step's list.
+    pub fn add_body(&mut self, index: usize, work: &mut BodyWork) {
+        let local = self.members.len();
+        self.members.push(index);
+        self.handles.push(work.handle);
+        self.island.bodies.extend(work.problem.take());
+        for mut constraint in work.constraints.drain(..) {
+            for endpoint in &mut constraint.endpoints {
+                if let Endpoint::Soft { body, .. } = endpoint {
+                    *body = local;
+                }
+            }
+            self.island.contacts.constraints.push(constraint);
+        }
+    }
+
+    /// Adds a constraint between members or proxies of the island: of what holds the latter, of
+    /// attachments, of contacts between deformables.
+    pub fn add_shared(&mut self, mut constraint: Constraint) {
+        for endpoint in &mut constraint.endpoints {
+            if let Endpoint::Soft { body, .. } = endpoint {
+                // Members are in ascending order.
+                let Ok(local) = self.members.binary_search(body) else { return };
+                *body = local;
+            }
+        }
+        self.island.contacts.constraints.push(constraint);
+    }
+
+    /// Whether every number that leaves the island is finite.
+    pub fn is_finite(&self) -> bool {
+        self.island.bodies.iter().all(|b| b.current.x.iter().all(is_number))
+            && self.island.contacts.lambda.iter().all(|l| l.is_finite())
+    }
+
+    /// Gives neighbourhood and attachments the forces that a member remembers.
+    pub fn warm_start_links(&mut self, state: &DeformableState) {
+        for constraint in
+            self.island.contacts.constraints.iter_mut().filter(|constraint| constraint.key.is_shared())
+        {
+            if let Some(memory) = state.shared_memory(&constraint.key) {
+                constraint.warm_start(memory);
+            }
+        }
+    }
+
+    fn active_constraints(&self) -> impl Iterator<Item = (usize, &Constraint)> {
+        let contacts = &self.island.contacts;
+        contacts.constraints[..contacts.active()].iter().enumerate()
+    }
+
+    /// What neighbourhood and attachments leave to the next step, ascending by key.
+    pub fn memory_of_links(&self, h: f64, memory: &mut Vec<ConstraintMemory>) {
+        memory.clear();
+        let links = self.active_constraints().filter(|(_, constraint)| constraint.key.is_shared());
+        memory.extend(links.map(|(i, _)| self.island.contacts.memory(i, h)));
+        memory.sort_unstable_by_key(|m| m.key);
+    }
+
+    /// What the contacts of a member leave to the next step, ascending by key.
+    pub fn memory_of(&self, member: usize, h: f64, memory: &mut Vec<ConstraintMemory>) {
+        memory.clear();
+        // What held a rigid shape says nothing of the next step.
+        if self.island.bodies[member].is_rejected {
+            return;
+        }
+        let own = |constraint: &Constraint| matches!(constraint.endpoints[0], Endpoint::Soft { body, .. } if body == member);
+        let own = self
+            .active_constraints()
+            .filter(|(_, constraint)| own(constraint) && !constraint.key.is_shared());
+        memory.extend(own.map(|(i, _)| self.island.contacts.memory(i, h)));
+        memory.sort_unstable_by_key(|m| m.key);
+    }
+}

@@ -1,0 +1,86 @@
+//! What is put right at the end of a body's step, and read off it.
+
+use super::problem::BodyProblem;
+use crate::math::{Mat3, Vec3, rotation_from_vector, solve_semidefinite};
+
+/// Largest turn \[rad\] that [`BodyProblem::balance`] takes for the rest of an iteration.
+const MAX_BALANCING_TURN: f64 = 0.1;
+
+/// Largest rotation \[rad\] in a step that [`BodyProblem::final_velocities`] gives back.
+const MAX_SPIN_GIVEN: f64 = 0.5;
+
+impl BodyProblem {
+    /// Moves and turns a body that nothing holds as a whole, so that its residual has neither force nor
+    /// moment: what is left of it after a few iterations would set the body spinning. Deforms nothing.
+    pub fn balance(&mut self) {
+        let mobility = self.mobility();
+        let total: f64 = self.masses.iter().sum();
+        let x = &mut self.current.x;
+        let centre = x.iter().zip(&self.masses).map(|(x, m)| x * *m).sum::<Vec3>() / total;
+        let (mut force, mut moment, mut inertia) = (Vec3::zeros(), Vec3::zeros(), Mat3::zeros());
+        for ((x, r), m) in x.iter().zip(&self.current.r).zip(&self.masses) {
+            let arm = x - centre;
+            force += r;
+            moment += arm.cross(r);
+            inertia += (Mat3::identity() * arm.norm_squared() - arm * arm.transpose()) * *m;
+        }
+        let turn = solve_semidefinite(&inertia, &moment) * mobility;
+        let turn = if turn.norm() < MAX_BALANCING_TURN { turn } else { Vec3::zeros() };
+        let (rotation, shift) = (rotation_from_vector(&turn), force * (mobility / total));
+        x.iter_mut().for_each(|x| *x = centre + shift + rotation * (*x - centre));
+    }
+
+    /// Velocities at the end of the step [m/s]; `in_flight` tells that nothing touched or tied the body. Implicit
+    /// Euler then loses angular momentum that nothing has taken: a rotation about the centre of mass puts
+    /// it back.
+    pub fn final_velocities(&self, in_flight: bool, v: &mut Vec<Vec3>) {
+        v.clear();
+        v.extend(self.current.x.iter().zip(&self.x_start).map(|(new, old)| (new - old) / self.h));
+        if !(in_flight && self.settings.keeps_spin && self.key.pins.is_empty()) {
+            return;
+        }
+        let total: f64 = self.masses.iter().sum();
+        let mean = |p: &[Vec3]| p.iter().zip(&self.masses).map(|(p, m)| p * *m).sum::<Vec3>() / total;
+        let centre = mean(&self.current.x);
+        let inertial = |i: usize| self.target[i] - self.x_start[i] - self.v_start[i] * self.h;
+        let (mut gained, mut lost) = (Vec3::zeros(), Vec3::zeros());
+        let mut inertia = Mat3::zeros();
+        for (i, m) in self.masses.iter().enumerate() {
+            let arm = self.current.x[i] - centre;
+            // External forces act where the nodes are at the end of the step, as in the step itself.
+            gained += arm.cross(&inertial(i)) * (*m / (self.h * self.h) * self.dt);
+            lost += arm.cross(&v[i]) * *m;
+            inertia += (Mat3::identity() * arm.norm_squared() - arm * arm.transpose()) * *m;
+        }
+        let drag = 1.0 + self.material.mass_damping * self.dt;
+        let missing = (self.spin + gained) / drag - lost;
+        let turn = solve_semidefinite(&inertia, &missing);
+        if turn.norm() * self.h < MAX_SPIN_GIVEN {
+            for (v, x) in v.iter_mut().zip(&self.current.x) {
+                *v += turn.cross(&(x - centre));
+            }
+        }
+    }
+
+    /// What the iteration has left of the forces on free nodes \[N\], per pinned node: the pins carry it too, so
+    /// that with gravity and contacts they add up to what moves the body.
+    pub fn pin_share(&self) -> Vec3 {
+        let mut left = Vec3::zeros();
+        let mut pins = self.key.pins.iter().peekable();
+        for (i, (r, f)) in self.current.r.iter().zip(&self.contact_force).enumerate() {
+            if pins.next_if(|&&p| p as usize == i).is_none() {
+                left += r + f;
+            }
+        }
+        left / self.key.pins.len().max(1) as f64
+    }
+
+    /// Force \[N\] with which a pinned node is held; `share` is [`BodyProblem::pin_share`].
+    pub fn pin_force(&self, node: u32, share: &Vec3) -> Vec3 {
+        let Ok(k) = self.key.pins.binary_search(&node) else { return Vec3::zeros() };
+        let node = node as usize;
+        let inertia =
+            (self.pinned_inertia[k] - self.current.x[node]) * (self.masses[node] / (self.h * self.h));
+        -(inertia + self.current.r[node] + self.contact_force[node]) - share
+    }
+}

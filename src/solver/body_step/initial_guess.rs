@@ -1,0 +1,94 @@
+//! Where the iteration of a body starts, and in which frames.
+
+use super::problem::{BodyProblem, FRAME_ERROR};
+use crate::body::{Frames, Solver};
+use crate::fem::{SystemMatrix, floating_frame};
+use crate::math::{Mat3, Vec3};
+use crate::solver::linear::SystemFactor;
+
+/// Largest rotation of an element against the body's frame for which one frame serves.
+const FLOATING_LIMIT: f64 = 20.0 * std::f64::consts::PI / 180.0;
+
+impl BodyProblem {
+    /// Chooses where the iteration starts, and the frames of the preconditioner: the rigidly extrapolated
+    /// shape or the inertial target, whichever has the lower Ψ.
+    pub fn choose_initial_guess(&mut self, factor: &SystemFactor) {
+        let model = self.model.clone();
+        let is_pinned = !self.key.pins.is_empty();
+        if is_pinned {
+            // What is held does not fall: by its motion alone, so that what hangs still starts where it is.
+            let drift = self.x_start.iter().zip(&self.v_start).map(|(x, v)| x + v * self.h);
+            self.force.clear();
+            self.force.extend(drift);
+            self.key.pins.iter().for_each(|&p| self.force[p as usize] = self.target[p as usize]);
+        }
+        let goes_to = if is_pinned { &self.force } else { &self.target };
+        let (turned, _, centre) = floating_frame(&model, goes_to);
+        let (before, _, centre_before) = floating_frame(&model, &self.x_start);
+        let turn = turned * before.transpose();
+        self.current.x.clear();
+        let carried = self.x_start.iter().map(|x| centre + turn * (x - centre_before));
+        self.current.x.extend(carried);
+        if is_pinned {
+            // Shift so that the pinned nodes fit on average, then put them where they belong.
+            let miss = |&p: &u32| self.target[p as usize] - self.current.x[p as usize];
+            let shift = self.key.pins.iter().map(miss).sum::<Vec3>() / self.key.pins.len() as f64;
+            self.current.x.iter_mut().for_each(|x| *x += shift);
+            for &p in &self.key.pins {
+                self.current.x[p as usize] = self.target[p as usize];
+            }
+        }
+        self.frame = turned;
+        self.evaluate_current();
+        self.trial.x.clone_from(&self.target);
+        let mut trial = std::mem::take(&mut self.trial);
+        self.evaluate(&mut trial, self.current.objective);
+        self.trial = trial;
+        // Written so that a non-finite extrapolation loses.
+        if !(self.current.objective <= self.trial.objective) {
+            self.accept_trial();
+        }
+        self.choose_frames(&turned, factor);
+    }
+
+    fn choose_frames(&mut self, turned: &Mat3, factor: &SystemFactor) {
+        // The Hessian is that of the world.
+        if self.settings.solver == Solver::Newton {
+            return self.preconditioner.set_floating(&Mat3::identity());
+        }
+        let mobility = self.mobility();
+        let is_free = self.key.pins.is_empty();
+        let per_node = factor.system != SystemMatrix::Laplacian
+            && match self.settings.frames {
+                Frames::Floating => false,
+                Frames::PerNode => true,
+                Frames::Automatic => self.current.least_trace < 1.0 + 2.0 * FLOATING_LIMIT.cos(),
+            };
+        if per_node {
+            let (x, masses) = (&self.current.x, &self.masses);
+            return self.preconditioner.set_per_node(&self.model, x, masses, mobility, is_free, factor);
+        }
+        match factor.system {
+            SystemMatrix::Laplacian => self.preconditioner.set_isotropic(),
+            SystemMatrix::RestStiffness => self.preconditioner.set_floating(turned),
+        }
+        if is_free && factor.factor.is_rough() {
+            self.preconditioner.deflate(&self.masses, mobility, factor);
+        } else {
+            self.preconditioner.set_clusters(factor, &self.current.x);
+        }
+    }
+
+    /// Turns the one frame of the body after the current iterate, where a contact has turned the body
+    /// against its free motion; true if it did. The rest stiffness in a frame that is off by θ resists
+    /// rotation with θ² of its stiffness.
+    pub fn refresh_frame(&mut self) -> bool {
+        let has_no_frame =
+            self.key.system == SystemMatrix::Laplacian || self.settings.solver == Solver::Newton;
+        if self.preconditioner.is_per_node() || has_no_frame {
+            return false;
+        }
+        let (turned, _, _) = floating_frame(&self.model, &self.current.x);
+        self.preconditioner.turn_floating(&turned, FRAME_ERROR)
+    }
+}

@@ -1,0 +1,11 @@
+//! One body within a step: its objective, initial guess, rigid fallback, and what is read off at the end.
+
+mod problem;
+
+mod finish;
+mod initial_guess;
+mod newton_factors;
+mod rigid_fallback;
+
+pub(crate) use newton_factors::{Factors, NewtonFactors};
+pub(crate) use problem::{BodyProblem, SECOND_ORDER};

@@ -1,0 +1,95 @@
+//! Factors of bodies that are solved by Newton's method: of the Hessian where the iteration is, made anew in
+//! every iteration, with the columns that the body's contacts want.
+
+use super::problem::BodyProblem;
+use crate::body::Solver;
+use crate::contact::{Constraint, Endpoint};
+use crate::fem::SystemMatrix;
+use crate::solver::linear::{
+    ComplianceColumns, FactorCache, FactorScratch, Symbolic, SystemFactor, assemble_tangent,
+};
+
+/// Factors of an island's bodies: their own where they have such, else those of the cache.
+#[derive(Clone, Copy)]
+pub(crate) struct Factors<'a> {
+    pub cache: &'a FactorCache,
+    pub newton: &'a NewtonFactors,
+}
+
+impl<'a> Factors<'a> {
+    /// The factor of the island's body `index`.
+    pub fn of(&self, index: usize, body: &BodyProblem) -> &'a SystemFactor {
+        let own = self.newton.made.get(index).and_then(Option::as_ref);
+        own.unwrap_or_else(|| self.cache.get(body.factor))
+    }
+}
+
+/// The factors that the bodies of an island have made themselves.
+#[derive(Default)]
+pub(crate) struct NewtonFactors {
+    made: Vec<Option<SystemFactor>>,
+    count: u64,
+    scratch: FactorScratch,
+}
+
+impl NewtonFactors {
+    /// Forgets those of the last step.
+    pub fn begin(&mut self, bodies: usize) {
+        self.made.clear();
+        self.made.resize_with(bodies, || None);
+    }
+
+    /// Makes the factors at the bodies' current states; true if there are bodies that want them.
+    pub fn refresh(
+        &mut self,
+        bodies: &mut [BodyProblem],
+        cache: &FactorCache,
+        constraints: &[Constraint],
+    ) -> bool {
+        let mut some = false;
+        for (index, body) in bodies.iter_mut().enumerate() {
+            if body.settings.solver != Solver::Newton {
+                continue;
+            }
+            some = true;
+            body.step_damping = 1.0;
+            let symbolic = &cache.get(body.factor).symbolic;
+            self.made[index] = self.tangent(index, body, symbolic, constraints);
+        }
+        some
+    }
+
+    /// The Hessian itself if it is positive definite, else without its negative part. `None` where even
+    /// that cannot be factored: the body then makes do with the cache's.
+    fn tangent(
+        &mut self,
+        index: usize,
+        body: &BodyProblem,
+        symbolic: &std::sync::Arc<Symbolic>,
+        constraints: &[Constraint],
+    ) -> Option<SystemFactor> {
+        let factor = [false, true].into_iter().find_map(|projected| {
+            let (x, pins) = (&body.current.x, &body.key.pins);
+            let values = assemble_tangent(&body.elements(), x, projected, pins, body.h(), symbolic);
+            symbolic.factorize(&values, &mut self.scratch).ok()
+        })?;
+        let surface = &body.model.surface;
+        let mut columns = ComplianceColumns::new(surface, SystemMatrix::RestStiffness);
+        let nodes = constraints
+            .iter()
+            .flat_map(|constraint| &constraint.endpoints)
+            .filter(|endpoint| endpoint.is_of(index))
+            .flat_map(Endpoint::soft_nodes);
+        let nodes = nodes.map(|(node, _)| surface.index_of_node[node]);
+        columns.prepare(&body.model, &body.key.pins, symbolic, &factor, nodes, &mut self.scratch);
+        self.count += 1;
+        Some(SystemFactor {
+            symbolic: symbolic.clone(),
+            factor,
+            system: SystemMatrix::RestStiffness,
+            columns,
+            clusters: None,
+            serial: u64::MAX - self.count,
+        })
+    }
+}

@@ -1,0 +1,377 @@
+//! One body within a step: its objective, its start, its residual.
+//!
+//! The step minimises `Ψ(x) = 1/(2h²)‖x − s‖²_M + α/(2h)‖x − x_n‖²_M + E(x)`, with
+//! `s = x_n + h v_n + h² M⁻¹ f_ext` [Bouaziz et al. 2014], E the elastic energy with the stiffness
+//! damping of the step. The residual is `r = −∂Ψ/∂x` \[N\]; pinned nodes are not unknowns.
+
+use crate::body::{DeformableBody, Integrator, PrescribedNode, SolverSettings};
+use crate::fem::elastic_forces::StiffnessDamping;
+use crate::fem::{DeformableModel, Elements, elastic_forces};
+use crate::material::DeformableMaterial;
+use crate::math::{Mat3, Vec3, rotation_from_vector, skew, solve_semidefinite};
+use crate::profiler::timed;
+use crate::solver::counters::SolveCounters;
+use crate::solver::linear::{FactorId, FactorKey, Preconditioner, SystemFactor};
+use std::sync::Arc;
+
+/// Error of the body's frame \[rad\] beyond which it is refreshed within a step.
+pub(super) const FRAME_ERROR: f64 = 1.0e-4;
+
+/// Step of the matrix over that of time, of the second order.
+pub(crate) const SECOND_ORDER: f64 = 2.0 / 3.0;
+
+/// A body's step in the making.
+pub(crate) struct BodyProblem {
+    pub key: FactorKey,
+    /// To be set when the factor is prepared.
+    pub factor: FactorId,
+    pub model: Arc<DeformableModel>,
+    pub settings: SolverSettings,
+    pub(super) material: DeformableMaterial,
+    pub(super) activation: f64,
+    /// The step that the matrix is of \[s\], and that by which time goes on.
+    pub(super) h: f64,
+    pub(super) dt: f64,
+    /// Goes forward by two steps.
+    pub(super) is_second_order: bool,
+    /// Positions and velocities at the start of the step; of the second order what they amount to.
+    pub x_start: Vec<Vec3>,
+    pub v_start: Vec<Vec3>,
+    /// Angular momentum at the start.
+    pub(super) spin: Vec3,
+    /// Where the nodes would go without internal and contact forces.
+    pub target: Vec<Vec3>,
+    pub(super) masses: Vec<f64>,
+    pub(super) damping: StiffnessDamping,
+    pub current: Iterate,
+    pub trial: Iterate,
+    /// Contact forces on the nodes \[N\].
+    pub contact_force: Vec<Vec3>,
+    /// What the last contact problem added to them \[N\].
+    pub contact_change: Vec<Vec3>,
+    pub preconditioner: Preconditioner,
+    /// Factor c ≥ 1 on A, raised by the guard.
+    pub step_damping: f64,
+    pub guard_retries: usize,
+    /// The step would have made energy: the body moves as a whole.
+    pub is_rejected: bool,
+    /// A force that counts as large for this body \[N\].
+    pub weight: f64,
+    pub(super) step: Vec<Vec3>,
+    pub(super) force: Vec<Vec3>,
+    /// The body's frame at the start of the iteration.
+    pub(super) frame: Mat3,
+    /// Nodes that attachments hold, ascending; pinned for the step.
+    pub prescribed: Vec<PrescribedNode>,
+    /// Where the pinned nodes would go by inertia and external forces.
+    pub(super) pinned_inertia: Vec<Vec3>,
+}
+
+/// A point of the iteration with what was evaluated there.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Iterate {
+    pub x: Vec<Vec3>,
+    /// Residual \[N\]; at pinned nodes minus the force of the pin.
+    pub r: Vec<Vec3>,
+    /// Ψ \[J\].
+    pub objective: f64,
+    /// E, with the stiffness damping of the step \[J\].
+    pub elastic: f64,
+    /// Least `tr(QᵀR)` of the elements against the body's frame.
+    pub least_trace: f64,
+    /// Largest internal force on a node \[N\].
+    pub internal: f64,
+}
+
+impl BodyProblem {
+    /// Takes in a body at the start of a step of `h` \[s\] under `gravity` [m/s²], with what attachments hold of it.
+    pub fn new(body: &DeformableBody, h: f64, gravity: &Vec3, prescribed: &[PrescribedNode]) -> Self {
+        let n = body.state.x.len();
+        let mut problem = Self {
+            key: FactorKey::new(body, h),
+            factor: FactorId::default(),
+            model: body.model.clone(),
+            settings: *body.settings(),
+            material: body.material,
+            activation: body.activation,
+            h,
+            dt: h,
+            is_second_order: false,
+            x_start: Vec::new(),
+            v_start: Vec::new(),
+            spin: Vec3::zeros(),
+            target: Vec::new(),
+            masses: Vec::new(),
+            damping: StiffnessDamping::default(),
+            current: Iterate::default(),
+            trial: Iterate::default(),
+            contact_force: vec![Vec3::zeros(); n],
+            contact_change: Vec::new(),
+            preconditioner: Preconditioner::default(),
+            step_damping: 1.0,
+            guard_retries: 0,
+            is_rejected: false,
+            weight: 0.0,
+            step: vec![Vec3::zeros(); n],
+            force: Vec::new(),
+            frame: Mat3::identity(),
+            prescribed: Vec::new(),
+            pinned_inertia: Vec::new(),
+        };
+        problem.begin(body, h, gravity, prescribed);
+        problem
+    }
+
+    /// As [`BodyProblem::new`], in the memory of an earlier step.
+    pub fn begin(&mut self, body: &DeformableBody, h: f64, gravity: &Vec3, prescribed: &[PrescribedNode]) {
+        // What its user has pinned stays there.
+        let is_free =
+            |node: &&PrescribedNode| body.pins.binary_search_by_key(&node.node, |p| p.node).is_err();
+        self.prescribed.clear();
+        self.prescribed.extend(prescribed.iter().filter(is_free));
+        self.prescribed.sort_unstable_by_key(|p| (p.node, p.attachment));
+        self.prescribed.dedup_by_key(|p| p.node);
+        let history = &body.state.history;
+        let continues = history.h == h && history.x.len() == body.state.x.len();
+        self.is_second_order = continues && body.settings().integrator == Integrator::Bdf2;
+        self.dt = h;
+        self.read_body(body, gravity);
+    }
+
+    /// Begins again by implicit Euler, if it had not been so: the body is touched.
+    pub fn begin_first_order(&mut self, body: &DeformableBody, gravity: &Vec3) {
+        if self.is_second_order {
+            self.is_second_order = false;
+            self.read_body(body, gravity);
+        }
+    }
+
+    fn read_body(&mut self, body: &DeformableBody, gravity: &Vec3) {
+        let n = body.state.x.len();
+        let h = if self.is_second_order { SECOND_ORDER * self.dt } else { self.dt };
+        self.key.update(body, h);
+        self.key.pins.extend(self.prescribed.iter().map(|p| p.node));
+        self.key.pins.sort_unstable();
+        self.settings = *body.settings();
+        self.material = body.material;
+        self.activation = body.activation;
+        self.h = h;
+        self.step_damping = 1.0;
+        self.guard_retries = 0;
+        self.is_rejected = false;
+        self.preconditioner.counters = SolveCounters::default();
+        self.x_start.clone_from(&body.state.x);
+        self.v_start.clone_from(&body.state.v);
+        self.spin = Vec3::from(body.angular_momentum());
+        if self.is_second_order {
+            let history = &body.state.history;
+            let starts = self.x_start.iter_mut().zip(&history.x);
+            starts.chain(self.v_start.iter_mut().zip(&history.v)).for_each(|(now, before)| {
+                *now += (*now - before) / 3.0;
+            });
+        }
+        self.masses.clear();
+        self.masses.extend((0..n).map(|i| body.node_mass(i)));
+        let g = gravity * body.gravity_scale();
+        self.target.clear();
+        let to_target = |i: usize| {
+            let acceleration = g + body.forces.get(i).map_or(Vec3::zeros(), |f| f / self.masses[i]);
+            self.x_start[i] + self.v_start[i] * h + acceleration * (h * h)
+        };
+        self.target.extend((0..n).map(to_target));
+        self.pinned_inertia.clear();
+        self.pinned_inertia.extend(self.key.pins.iter().map(|&p| self.target[p as usize]));
+        let pins = body.pins.iter().map(|pin| (pin.node, pin.target));
+        for (node, target) in pins.chain(self.prescribed.iter().map(|p| (p.node, p.target))) {
+            self.target[node as usize] = target;
+        }
+        self.contact_force.clear();
+        self.contact_force.resize(n, Vec3::zeros());
+        self.step.resize(n, Vec3::zeros());
+        let before = self.is_second_order.then_some(&body.state.history.x[..]);
+        self.damping.begin(&self.model, self.material.stiffness_damping, h, &body.state.x, before);
+        let mass = self.masses.iter().sum::<f64>();
+        self.weight = mass * g.norm() / n as f64;
+    }
+
+    /// What is elastic in the body.
+    pub fn elements(&self) -> Elements<'_> {
+        Elements { model: &self.model, material: &self.material, activation: self.activation }
+    }
+
+    /// Mass of a node \[kg\].
+    pub fn mass(&self, node: usize) -> f64 {
+        self.masses[node]
+    }
+
+    /// Displacement per force over mass of the body as a whole, h²/(1 + αh) [s²].
+    pub(super) fn mobility(&self) -> f64 {
+        self.h * self.h / (1.0 + self.material.mass_damping * self.h)
+    }
+
+    /// The step \[s\] that the matrix is of.
+    pub fn h(&self) -> f64 {
+        self.h
+    }
+
+    /// Sets the trial to `x + P(r + Jᵀλ⁰)/c`.
+    pub fn free_step(&mut self, factor: &SystemFactor) {
+        let mut force = std::mem::take(&mut self.force);
+        self.free_residual(&mut force);
+        self.step_by(factor, &force);
+        self.force = force;
+    }
+
+    /// Sets the trial to `x + P f/c`.
+    pub(super) fn step_by(&mut self, factor: &SystemFactor, force: &[Vec3]) {
+        self.trial.x.clone_from(&self.current.x);
+        self.preconditioner.apply(factor, force, &mut self.step);
+        self.add_step();
+    }
+
+    /// Adds `P Jᵀ(λ − λ⁰)/c` to the trial.
+    pub fn contact_step(&mut self, factor: &SystemFactor) {
+        self.preconditioner.apply(factor, &self.contact_change, &mut self.step);
+        self.add_step();
+    }
+
+    /// Sets the trial to `x + step/c`.
+    pub fn set_trial(&mut self, step: &[Vec3]) {
+        self.step.copy_from_slice(step);
+        self.trial.x.clone_from(&self.current.x);
+        self.add_step();
+    }
+
+    /// Where the step turns the body, puts the finite rotation in the place of the linear one: about
+    /// the centre of mass c the trial gains `(exp ω − I − ω×)(x − c)`, ω the mean rotation of the step.
+    /// A linear rotation by θ stretches everything by θ²/2, which a stiff body takes for a blow. What
+    /// it takes back draws contacts apart rather than together. True if there was something to bend:
+    /// contacts then want another iteration.
+    pub fn bend_step_to_rotation(&mut self) -> bool {
+        if self.preconditioner.is_per_node() || !self.key.pins.is_empty() {
+            return false;
+        }
+        let total: f64 = self.masses.iter().sum();
+        let mean = |p: &[Vec3]| p.iter().zip(&self.masses).map(|(p, m)| p * *m).sum::<Vec3>() / total;
+        let (centre, moved_to) = (mean(&self.current.x), mean(&self.trial.x));
+        let (mut moment, mut inertia) = (Vec3::zeros(), Mat3::zeros());
+        for ((x, y), m) in self.current.x.iter().zip(&self.trial.x).zip(&self.masses) {
+            let r = x - centre;
+            moment += r.cross(&(y - moved_to - r)) * *m;
+            inertia += (Mat3::identity() * r.norm_squared() - r * r.transpose()) * *m;
+        }
+        let omega = solve_semidefinite(&inertia, &moment);
+        // Below this the stretch is 5e-9.
+        if !(omega.norm() > FRAME_ERROR) {
+            return false;
+        }
+        let bend = rotation_from_vector(&omega) - Mat3::identity() - skew(&omega);
+        for (y, x) in self.trial.x.iter_mut().zip(&self.current.x) {
+            *y += bend * (x - centre);
+        }
+        true
+    }
+
+    /// Pinned nodes are rows of the identity in A, without neighbours: what the solve says of them
+    /// is no motion.
+    fn add_step(&mut self) {
+        self.key.pins.iter().for_each(|&p| self.step[p as usize] = Vec3::zeros());
+        let scale = 1.0 / self.step_damping;
+        for (x, d) in self.trial.x.iter_mut().zip(&self.step) {
+            *x += d * scale;
+        }
+    }
+
+    /// `r + Jᵀλ⁰`, zero at pinned nodes \[N\].
+    pub fn free_residual(&self, out: &mut Vec<Vec3>) {
+        out.clear();
+        out.extend(self.current.r.iter().zip(&self.contact_force).map(|(r, f)| r + f));
+        self.key.pins.iter().for_each(|&p| out[p as usize] = Vec3::zeros());
+    }
+
+    pub fn evaluate_current(&mut self) {
+        let mut iterate = std::mem::take(&mut self.current);
+        self.evaluate(&mut iterate, f64::INFINITY);
+        self.current = iterate;
+    }
+
+    pub fn evaluate_trial(&mut self) {
+        let mut iterate = std::mem::take(&mut self.trial);
+        self.evaluate(&mut iterate, f64::INFINITY);
+        self.trial = iterate;
+    }
+
+    /// Given up, with an infinite objective, where that would exceed `limit` \[J\].
+    pub(super) fn evaluate(&mut self, at: &mut Iterate, limit: f64) {
+        at.r.clear();
+        at.r.resize(at.x.len(), Vec3::zeros());
+        let (model, material, activation) = (&*self.model, &self.material, self.activation);
+        let elements = Elements { model, material, activation };
+        let time = &mut self.preconditioner.counters.element_time;
+        let elastic = timed(time, || {
+            elastic_forces::add_forces(&elements, &self.damping, &at.x, &self.frame, limit, &mut at.r)
+        });
+        self.preconditioner.counters.elements += elastic.evaluated;
+        if elastic.energy == f64::INFINITY {
+            at.objective = f64::INFINITY;
+            return;
+        }
+        at.elastic = elastic.energy;
+        at.least_trace = elastic.least_trace;
+        at.internal = at.r.iter().map(|f| f.amax()).fold(0.0, f64::max);
+        let (inertia, drag) = (1.0 / (self.h * self.h), self.material.mass_damping / self.h);
+        let mut kinetic = 0.0;
+        for i in 0..at.x.len() {
+            let (from_target, moved) = (self.target[i] - at.x[i], at.x[i] - self.x_start[i]);
+            let m = self.masses[i];
+            at.r[i] += (from_target * inertia - moved * drag) * m;
+            kinetic += m * (inertia * from_target.norm_squared() + drag * moved.norm_squared());
+        }
+        at.objective = elastic.energy + 0.5 * kinetic;
+    }
+
+    /// The guard [cf. Nocedal & Wright 2006, sufficient decrease]:
+    /// `Ψ(x + d) − λᵀJd ≤ Ψ(x) − 0.1·dᵀ(r + Jᵀλ)`.
+    pub fn trial_descends(&self) -> bool {
+        let (mut by_contact, mut by_residual) = (0.0, 0.0);
+        for i in 0..self.trial.x.len() {
+            let d = self.trial.x[i] - self.current.x[i];
+            by_contact += d.dot(&self.contact_force[i]);
+            by_residual += d.dot(&self.current.r[i]);
+        }
+        let promised = 0.1 * (by_contact + by_residual);
+        // Ψ is a sum over the elements: its rounding is below 1e-13 of its terms.
+        let rounding = 1e-12 * (self.trial.objective + self.current.objective + by_contact.abs());
+        self.trial.objective - by_contact <= self.current.objective - promised + rounding
+    }
+
+    /// Makes the trial the current iterate: no step.
+    pub fn reject_trial(&mut self) {
+        self.trial.clone_from(&self.current);
+    }
+
+    pub fn accept_trial(&mut self) {
+        std::mem::swap(&mut self.current, &mut self.trial);
+    }
+
+    /// Largest component of `r + Jᵀλ` over the free nodes \[N\].
+    pub fn residual(&self) -> f64 {
+        let mut largest = 0.0_f64;
+        let mut pins = self.key.pins.iter().peekable();
+        for i in 0..self.current.r.len() {
+            if pins.next_if(|&&p| p as usize == i).is_some() {
+                continue;
+            }
+            let size = (self.current.r[i] + self.contact_force[i]).amax();
+            // NaN must not vanish in a maximum.
+            largest = if size.is_nan() { f64::INFINITY } else { largest.max(size) };
+        }
+        largest
+    }
+
+    /// The force that residuals are measured by \[N\].
+    pub fn force_scale(&self) -> f64 {
+        let contact = self.contact_force.iter().map(|f| f.amax()).fold(0.0, f64::max);
+        self.weight.max(self.current.internal).max(contact)
+    }
+}

@@ -1,0 +1,92 @@
+//! Steps that would make energy out of nothing are given up: the body keeps its shape and moves as a rigid one, in
+//! contact with what it touches. Between rigid bodies contacts only ever take energy.
+
+use super::problem::BodyProblem;
+use crate::math::Vec3;
+use crate::solver::linear::SystemFactor;
+
+/// Share of a body's energy that a step of one iteration may make: such steps gain up to 3 % and lose it in the next
+/// ones. Those of n iterations a part in n² of it.
+const MAX_GAIN: f64 = 0.04;
+
+/// As [`MAX_GAIN`], of the work that contacts do on the body.
+const MAX_GAIN_OF_WORK: f64 = 1.0e-3;
+
+/// Factor on A of pinned bodies that keep their shape: they yield next to nothing.
+const STIFFENING: f64 = 1024.0;
+
+impl BodyProblem {
+    /// Whether the step makes energy out of nothing: more elastic and kinetic energy than the forces on the body have put
+    /// into it, and `besides` \[J\] that others have gained. An implicit Euler step of a convex energy only ever
+    /// takes some [cf. Hairer et al. 2006].
+    pub fn gains_energy(&mut self, besides: f64) -> bool {
+        let mut still = std::mem::take(&mut self.trial);
+        still.x.clone_from(&self.x_start);
+        self.evaluate(&mut still, f64::INFINITY);
+        let before = still.elastic;
+        self.trial = still;
+        let (mut kinetic, mut gained, mut by_contact) = (0.0, self.current.elastic - before, 0.0);
+        let mut pins = self.key.pins.iter().peekable();
+        for (i, m) in self.masses.iter().enumerate() {
+            let moved = self.current.x[i] - self.x_start[i];
+            if pins.next_if(|&&p| p as usize == i).is_some() {
+                // The force of the pin.
+                gained += self.current.r[i].dot(&moved);
+                continue;
+            }
+            let v = self.v_start[i];
+            let external = ((self.target[i] - self.x_start[i]) / self.h - v) * (*m / self.h);
+            let contact = self.contact_force[i].dot(&moved);
+            kinetic += 0.5 * m * v.norm_squared();
+            gained += 0.5 * m * (moved.norm_squared() / (self.h * self.h) - v.norm_squared());
+            gained -= external.dot(&moved) + contact;
+            by_contact += contact;
+        }
+        let iterations = self.settings.max_iterations.max(1) as f64;
+        let share = MAX_GAIN / iterations;
+        let allowed = share * (before + kinetic) + MAX_GAIN_OF_WORK * by_contact.abs();
+        // Written so that what is not a number counts as gained.
+        !(gained + besides <= allowed)
+    }
+
+    /// Energy \[J\] that it takes to put nodes elsewhere at the end of the step: what the body has then at `x`, and there
+    /// is lost of its motion.
+    pub fn strain_energy(&mut self, x: &[Vec3], lost: f64) -> f64 {
+        let mut there = std::mem::take(&mut self.trial);
+        there.x.clear();
+        there.x.extend_from_slice(x);
+        self.evaluate(&mut there, f64::INFINITY);
+        let gained = there.elastic - self.current.elastic - lost;
+        self.trial = there;
+        gained
+    }
+
+    /// Gives the step up: sets the trial to where the body goes in its shape under the present contact forces, from
+    /// where it was at the start.
+    pub fn begin_rigid_fallback(&mut self, factor: &SystemFactor) {
+        self.current.x.clone_from(&self.x_start);
+        self.key.pins.iter().for_each(|&p| self.current.x[p as usize] = self.target[p as usize]);
+        let mut forces = std::mem::take(&mut self.force);
+        forces.clone_from(&self.contact_force);
+        if self.key.pins.is_empty() {
+            self.preconditioner.set_rigid(&self.x_start, &self.masses, self.mobility());
+            self.step_damping = 1.0;
+            for (i, force) in forces.iter_mut().enumerate() {
+                *force += (self.target[i] - self.x_start[i]) * (self.masses[i] / (self.h * self.h));
+            }
+        } else {
+            self.step_damping = STIFFENING;
+        }
+        self.step_by(factor, &forces);
+        self.force = forces;
+    }
+
+    /// Ends what [`BodyProblem::begin_rigid_fallback`] began, with the trial where contacts have led it: by a finite rotation.
+    pub fn finish_rigid_fallback(&mut self) {
+        if self.key.pins.is_empty() {
+            self.bend_step_to_rotation();
+            self.accept_trial();
+        }
+        self.evaluate_current();
+    }
+}

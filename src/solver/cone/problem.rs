@@ -1,0 +1,72 @@
+//! What a cone problem consists of, how exactly it is to be solved, and what that took.
+
+use crate::contact::Law;
+use crate::solver::linear::BlockMatrix;
+
+/// The data of one problem. A contact has three rows, or one without friction; everything is packed.
+#[derive(Default)]
+pub(crate) struct ConeProblem {
+    /// First row of each contact, and the number of rows last.
+    pub offsets: Vec<usize>,
+    pub laws: Vec<Law>,
+    /// Delassus operator [m/N], symmetric.
+    pub W: BlockMatrix,
+    /// First contact of each block, and the number of contacts last.
+    pub groups: Vec<usize>,
+    /// Pairs of blocks of W that its factor may fill.
+    pub filled: Vec<(usize, usize)>,
+    /// Changes whenever W does.
+    pub version: u64,
+    /// Gaps and slips without contact forces \[m\], the shift included in the normal ones.
+    pub g: Vec<f64>,
+}
+
+/// How hard to try.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ConeTolerance {
+    /// Of `‖z − γ‖∞` relative to the largest force.
+    pub relative: f64,
+    /// The force that counts as large where there is none \[N\].
+    pub floor: f64,
+}
+
+/// What a solve took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct ConeWork {
+    pub newton_steps: usize,
+    pub factorizations: usize,
+    pub failures: usize,
+}
+
+impl ConeProblem {
+    pub fn rows(&self) -> usize {
+        self.offsets.last().copied().unwrap_or(0)
+    }
+
+    pub fn contacts(&self) -> usize {
+        self.laws.len()
+    }
+
+    /// `out = W v`.
+    pub fn multiply(&self, v: &[f64], out: &mut Vec<f64>) {
+        self.W.multiply(v, out);
+    }
+}
+
+/// Largest absolute value; infinite if one is NaN.
+pub(super) fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    let larger = |a: f64, v: f64| if v.is_nan() { f64::INFINITY } else { a.max(v.abs()) };
+    values.fold(0.0, larger)
+}
+
+pub(super) fn spatial(rows: &[f64]) -> [f64; 3] {
+    match rows {
+        [n, t1, t2] => [*n, *t1, *t2],
+        [n, ..] => [*n, 0.0, 0.0],
+        [] => [0.0; 3],
+    }
+}
+
+pub(super) fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

@@ -1,0 +1,376 @@
+//! Sparse and dense Cholesky factors: the one file that names faer.
+//!
+//! All solves are sequential (`Par::Seq`): faer's threads cost more than small supernodes are
+//! worth, and parallelism is over bodies. Everything works in memory the caller owns.
+
+use super::factor_values::{Factor, NotPositiveDefinite};
+use super::operator::ConjugateScratch;
+use super::supernodes::{Entry, Supernodes};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt;
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_inverse::invert_lower_triangular;
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::perm::PermRef;
+use faer::reborrow::ReborrowMut;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
+};
+use faer::sparse::linalg::{SupernodalThreshold, amd};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
+use faer::{Accum, MatMut, MatRef, Par, Side, Spec};
+
+/// Right-hand sides of one batch of columns: always the same number, so that a column has the same
+/// bits whichever batch it comes from.
+pub(crate) const BATCH: usize = 24;
+
+/// Sparsity of a symmetric matrix over nodes (upper triangle by columns) and of its factor.
+#[derive(Debug)]
+pub(crate) struct Symbolic {
+    /// Unknowns per node.
+    pub(super) d: usize,
+    /// None of a matrix that is not put together.
+    analysis: Option<(SymbolicSparseColMat<usize>, SymbolicCholesky<usize>)>,
+    pub(super) supernodes: Supernodes,
+    /// Old node at each new place, and the other way round.
+    order: Vec<usize>,
+    pub(super) places: Vec<usize>,
+}
+
+/// Memory for solves and factorizations; grows to what is needed and stays.
+#[derive(Default)]
+pub(crate) struct FactorScratch {
+    buffer: Option<MemBuffer>,
+    bytes: usize,
+    pub(super) ordered: Vec<f64>,
+    gathered: Vec<f64>,
+    panel: Vec<f64>,
+    pub(super) conjugate: ConjugateScratch,
+}
+
+impl Symbolic {
+    /// The pattern over nodes, with `starts` (n + 1) of its columns and ascending `rows` of the upper triangle,
+    /// diagonal included; every entry is a block of `d` unknowns squared. Ordered by approximate minimum degree
+    /// [Amestoy et al. 1996]: half the fill of nested dissection by coordinates on slender and chunky
+    /// lattices alike.
+    pub fn new(d: usize, starts: Vec<usize>, rows: Vec<usize>) -> Option<Self> {
+        let n = starts.len() - 1;
+        let (mut column_starts, mut all_rows) = (vec![0], Vec::new());
+        for (i, column) in starts.windows(2).enumerate() {
+            let above = &rows[column[0]..column[1] - 1];
+            for r in 0..d {
+                all_rows.extend(above.iter().flat_map(|&j| d * j..d * (j + 1)));
+                all_rows.extend(d * i..=d * i + r);
+                column_starts.push(all_rows.len());
+            }
+        }
+        let (order, places) = ordering(SymbolicSparseColMat::new_checked(n, n, starts, None, rows))?;
+        let spread = |of: &[usize]| -> Vec<usize> { of.iter().flat_map(|&i| d * i..d * (i + 1)).collect() };
+        let (all_order, all_places) = (spread(&order), spread(&places));
+        let pattern = SymbolicSparseColMat::new_checked(d * n, d * n, column_starts, None, all_rows);
+        let cholesky = factorize_symbolic_cholesky(
+            pattern.as_ref(),
+            Side::Upper,
+            SymmetricOrdering::Custom(PermRef::new_checked(&all_order, &all_places, d * n)),
+            CholeskySymbolicParams {
+                supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+                ..Default::default()
+            },
+        );
+        let cholesky = cholesky.ok()?;
+        let supernodes = supernodes_of(&cholesky, d)?;
+        Some(Self { d, analysis: Some((pattern, cholesky)), supernodes, order, places })
+    }
+
+    /// Of `n` nodes in their own order, without a matrix.
+    pub fn without_matrix(d: usize, n: usize) -> Self {
+        let order: Vec<usize> = (0..n).collect();
+        Self { d, analysis: None, supernodes: Supernodes::new(d), places: order.clone(), order }
+    }
+
+    pub fn column_starts(&self) -> &[usize] {
+        self.analysis.as_ref().map_or(&[], |(pattern, _)| pattern.col_ptr())
+    }
+
+    pub fn rows(&self) -> &[usize] {
+        self.analysis.as_ref().map_or(&[], |(pattern, _)| pattern.row_idx())
+    }
+
+    /// Numbers in a numeric factor.
+    pub fn factor_len(&self) -> usize {
+        self.supernodes.len()
+    }
+
+    /// Factors the matrix with these `values`, in the order of [`Symbolic::rows`].
+    pub fn factorize(
+        &self,
+        values: &[f64],
+        scratch: &mut FactorScratch,
+    ) -> Result<Factor, NotPositiveDefinite> {
+        let Some((pattern, cholesky)) = &self.analysis else { return Err(NotPositiveDefinite) };
+        let A = SparseColMatRef::new(pattern.as_ref(), values);
+        let need = cholesky.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
+        let mut factor = vec![0.0; cholesky.len_val()];
+        cholesky
+            .factorize_numeric_llt(
+                &mut factor,
+                A,
+                Side::Upper,
+                Default::default(),
+                Par::Seq,
+                scratch.stack(need.unaligned_bytes_required()),
+                Spec::default(),
+            )
+            .map_err(|_| NotPositiveDefinite)?;
+        Ok(Factor::Double(self.packed(&mut factor, &mut scratch.panel)))
+    }
+
+    /// The numbers as solves want them, from faer's `[T; B]` of every supernode, which is overwritten.
+    fn packed(&self, factor: &mut [f64], inverse: &mut Vec<f64>) -> Vec<f64> {
+        let mut values = vec![0.0; self.supernodes.len()];
+        let mut rest = factor;
+        for s in 0..self.supernodes.count() {
+            let (own, rows) = self.supernodes.nodes(s);
+            let (n, m) = (self.d * own.len(), self.d * (own.len() + rows.len()));
+            let (panel, after) = rest.split_at_mut(m * n);
+            rest = after;
+            let M = MatMut::from_column_major_slice_mut(panel, m, n);
+            let (mut triangle, mut below) = M.split_at_row_mut(n);
+            // X T = −B.
+            let right = below.rb_mut().transpose_mut();
+            solve_upper_triangular_in_place(triangle.as_ref().transpose(), right, Par::Seq);
+            below.col_iter_mut().for_each(|column| column.iter_mut().for_each(|v| *v = -*v));
+            inverse.clear();
+            inverse.resize(n * n, 0.0);
+            let mut inverted = MatMut::from_column_major_slice_mut(inverse, n, n);
+            invert_lower_triangular(inverted.rb_mut(), triangle.as_ref(), Par::Seq);
+            triangle.copy_from(inverted);
+            self.supernodes.pack(s, panel, &mut values);
+        }
+        values
+    }
+
+    /// Solves for many columns at once, one after the other in their own order, of which most numbers may
+    /// be zero.
+    pub fn solve_batch(&self, factor: &Factor, rhs: &mut [f64], scratch: &mut FactorScratch) {
+        let d = self.d;
+        let n = d * self.order.len();
+        if !matches!(factor, Factor::Double(_) | Factor::Single(_)) {
+            for column in rhs.chunks_exact_mut(n).filter(|c| c.iter().any(|v| *v != 0.0)) {
+                self.solve_without(factor, column, scratch);
+            }
+            return;
+        }
+        let mut ordered = std::mem::take(&mut scratch.ordered);
+        ordered.clear();
+        ordered.resize(rhs.len(), 0.0);
+        for (x, column) in ordered.chunks_exact_mut(n).zip(rhs.chunks_exact(n)) {
+            for (&old, x) in self.order.iter().zip(x.chunks_exact_mut(d)) {
+                x.iter_mut().zip(&column[d * old..]).for_each(|(x, v)| *x = *v);
+            }
+        }
+        match (factor, d) {
+            (Factor::Double(values), 1) => self.solve_panels::<_, 1>(values, &mut ordered, scratch),
+            (Factor::Double(values), _) => self.solve_panels::<_, 3>(values, &mut ordered, scratch),
+            (Factor::Single(values), 1) => self.solve_panels::<_, 1>(values, &mut ordered, scratch),
+            (Factor::Single(values), _) => self.solve_panels::<_, 3>(values, &mut ordered, scratch),
+            _ => {}
+        }
+        for (column, x) in rhs.chunks_exact_mut(n).zip(ordered.chunks_exact(n)) {
+            for (&old, x) in self.order.iter().zip(x.chunks_exact(d)) {
+                column[d * old..].iter_mut().zip(x).for_each(|(v, x)| *v = *x);
+            }
+        }
+        scratch.ordered = ordered;
+    }
+
+    /// [`BATCH`] columns at a time, D unknowns per node.
+    fn solve_panels<T: Entry, const D: usize>(
+        &self,
+        values: &[T],
+        x: &mut [f64],
+        scratch: &mut FactorScratch,
+    ) {
+        let n = D * self.order.len();
+        let count = self.supernodes.count();
+        let FactorScratch { gathered, panel, .. } = scratch;
+        let places = (0..count).map(|s| (s, true)).chain((0..count).rev().map(|s| (s, false)));
+        for (s, forward) in places {
+            let (own, rows) = self.supernodes.nodes(s);
+            let m = D * (own.len() + rows.len());
+            let own = D * own.start..D * own.end;
+            let mut is_unpacked = false;
+            for x in x.chunks_mut(n * BATCH) {
+                // Where a right-hand side is still zero, so is the solution.
+                if forward && x.chunks_exact(n).all(|x| x[own.clone()].iter().all(|v| *v == 0.0)) {
+                    continue;
+                }
+                if !is_unpacked {
+                    self.supernodes.unpack(s, values, panel);
+                    is_unpacked = true;
+                }
+                let M = MatRef::from_column_major_slice(panel, m, own.len());
+                let columns = x.len() / n;
+                gathered.clear();
+                if forward {
+                    gathered.resize(m * columns, 0.0);
+                    let top = MatRef::from_column_major_slice(x, n, columns).subrows(own.start, own.len());
+                    let product = MatMut::from_column_major_slice_mut(gathered, m, columns);
+                    matmul(product, Accum::Replace, M, top, 1.0, Par::Seq);
+                    for (g, x) in gathered.chunks_exact(m).zip(x.chunks_exact_mut(n)) {
+                        let (top, below) = g.split_at(own.len());
+                        x[own.clone()].copy_from_slice(top);
+                        for (&row, g) in rows.iter().zip(below.chunks_exact(D)) {
+                            let x = &mut x[D * row..D * (row + 1)];
+                            (0..D).for_each(|k| x[k] += g[k]);
+                        }
+                    }
+                } else {
+                    gathered.resize(m * columns, 0.0);
+                    for (g, x) in gathered.chunks_exact_mut(m).zip(x.chunks_exact(n)) {
+                        let (top, below) = g.split_at_mut(own.len());
+                        top.copy_from_slice(&x[own.clone()]);
+                        for (&row, g) in rows.iter().zip(below.chunks_exact_mut(D)) {
+                            let x = &x[D * row..D * (row + 1)];
+                            (0..D).for_each(|k| g[k] = x[k]);
+                        }
+                    }
+                    let known = MatRef::from_column_major_slice(gathered, m, columns);
+                    let mut X = MatMut::from_column_major_slice_mut(x, n, columns);
+                    let top = X.rb_mut().subrows_mut(own.start, own.len());
+                    matmul(top, Accum::Replace, M.transpose(), known, 1.0, Par::Seq);
+                }
+            }
+        }
+    }
+}
+
+/// Old node at each new place, and the other way round, for the upper triangle of a pattern.
+fn ordering(pattern: SymbolicSparseColMat<usize>) -> Option<(Vec<usize>, Vec<usize>)> {
+    let n = pattern.ncols();
+    let (mut order, mut places) = (vec![0; n], vec![0; n]);
+    let need = amd::order_maybe_unsorted_scratch::<usize>(n, pattern.compute_nnz());
+    let mut buffer = MemBuffer::new(need);
+    let stack = MemStack::new(&mut buffer);
+    amd::order_maybe_unsorted(&mut order, &mut places, pattern.as_ref(), Default::default(), stack).ok()?;
+    Some((order, places))
+}
+
+/// Where faer keeps the columns of a factor, in nodes of `d` unknowns. The unknowns of a node have the same pattern
+/// and are eliminated together, so supernodes are of whole nodes; `None` if they were not.
+fn supernodes_of(cholesky: &SymbolicCholesky<usize>, d: usize) -> Option<Supernodes> {
+    let SymbolicCholeskyRaw::Supernodal(raw) = cholesky.raw() else { return None };
+    let mut supernodes = Supernodes::new(d);
+    let begin = &raw.supernode_begin()[..raw.n_supernodes()];
+    for (s, end) in begin.iter().copied().chain([cholesky.nrows()]).skip(1).enumerate() {
+        let nodes = raw.supernode(s).pattern().chunks(d);
+        let is_whole =
+            |node: &[usize]| node[0].is_multiple_of(d) && node.iter().copied().eq(node[0]..node[0] + d);
+        if !end.is_multiple_of(d) || !nodes.clone().all(is_whole) {
+            return None;
+        }
+        supernodes.push(end / d, nodes.map(|node| node[0] / d));
+    }
+    Some(supernodes)
+}
+
+impl FactorScratch {
+    fn stack(&mut self, bytes: usize) -> &mut MemStack {
+        if self.bytes < bytes {
+            self.buffer = None;
+            self.bytes = bytes;
+        }
+        let bytes = self.bytes;
+        let new = || MemBuffer::new(faer::dyn_stack::StackReq::new::<u8>(bytes));
+        MemStack::new(self.buffer.get_or_insert_with(new))
+    }
+}
+
+/// Memory for dense factorizations.
+#[derive(Default)]
+pub(crate) struct DenseScratch(FactorScratch);
+
+/// Factors a dense symmetric matrix of order n, of which only the lower triangle is read, in its place.
+pub(crate) fn cholesky(
+    values: &mut [f64],
+    n: usize,
+    scratch: &mut DenseScratch,
+) -> Result<(), NotPositiveDefinite> {
+    let need = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Spec::default());
+    llt::factor::cholesky_in_place(
+        MatMut::from_column_major_slice_mut(values, n, n),
+        Default::default(),
+        Par::Seq,
+        scratch.0.stack(need.unaligned_bytes_required()),
+        Spec::default(),
+    )
+    .map(|_| ())
+    .map_err(|_| NotPositiveDefinite)
+}
+
+/// `B ← B L⁻ᵀ` for `rows` rows of B, L of order n.
+pub(crate) fn solve_from_right(L: &[f64], n: usize, B: &mut [f64], rows: usize) {
+    let L = MatRef::from_column_major_slice(L, n, n);
+    let B = MatMut::from_column_major_slice_mut(B, rows, n);
+    solve_lower_triangular_in_place(L, B.transpose_mut(), Par::Seq);
+}
+
+/// `C −= A Bᵀ`, with A of p × r, B of q × r numbers, `sizes` being [p, q, r].
+pub(crate) fn subtract_product(C: &mut [f64], A: &[f64], B: &[f64], [p, q, r]: [usize; 3]) {
+    let (A, B) = (MatRef::from_column_major_slice(A, p, r), MatRef::from_column_major_slice(B, q, r));
+    let C = MatMut::from_column_major_slice_mut(C, p, q);
+    matmul(C, Accum::Add, A, B.transpose(), -1.0, Par::Seq);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::lanes::Lane;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn factors_solve_what_they_were_made_of(
+            nodes in 1usize..40, d in prop_oneof![Just(1usize), Just(3)], columns in 1usize..4,
+            seed in proptest::collection::vec(-1.0..1.0f64, 200),
+        ) {
+            // Diagonally dominant with a few blocks off the diagonal, each as good as full.
+            let n = d * nodes;
+            let coupled = |i: usize, j: usize| i == j || matches!(i.abs_diff(j) * 7 % 5, 0 | 2);
+            let at = |i: usize, j: usize| match (coupled(i / d, j / d), i == j) {
+                (true, true) => 40.0 * d as f64,
+                (true, false) => seed[(i.max(j) * 13 + i.min(j) * 31) % seed.len()],
+                _ => 0.0,
+            };
+            let (mut starts, mut rows) = (vec![0], vec![]);
+            for j in 0..nodes {
+                rows.extend((0..=j).filter(|&i| coupled(i, j)));
+                starts.push(rows.len());
+            }
+            let mut scratch = FactorScratch::default();
+            let symbolic = Symbolic::new(d, starts, rows).unwrap();
+            let places = symbolic.column_starts().windows(2).enumerate().flat_map(|(j, w)| (w[0]..w[1]).map(move |k| (j, k)));
+            let values: Vec<f64> = places.map(|(j, k)| at(symbolic.rows()[k], j)).collect();
+            let factor = symbolic.factorize(&values, &mut scratch).unwrap();
+            let x: Vec<f64> = (0..n * 3 * columns).map(|k| seed[(k * 3) % seed.len()]).collect();
+            let b: Vec<f64> =
+                (0..x.len()).map(|k| (0..n).map(|j| at(k % n, j) * x[k / n * n + j]).sum()).collect();
+            let mut batch = b.clone();
+            symbolic.solve_batch(&factor, &mut batch, &mut scratch);
+            let mut single = vec![0.0; x.len()];
+            // With one unknown per node three right-hand sides go together.
+            let together = n * 3 / d;
+            for (out, b) in single.chunks_exact_mut(together).zip(b.chunks_exact(together)) {
+                let mut ordered = vec![Lane::default(); nodes];
+                let at = |i: usize, c: usize| if d == 3 { 3 * i + c } else { n * c + i };
+                (0..nodes).for_each(|i| (0..3).for_each(|c| ordered[symbolic.places()[i]].0[c] = b[at(i, c)]));
+                symbolic.solve(&factor, &mut ordered, &mut scratch);
+                (0..nodes).for_each(|i| (0..3).for_each(|c| out[at(i, c)] = ordered[symbolic.places()[i]].0[c]));
+            }
+            for k in 0..x.len() {
+                prop_assert!((single[k] - x[k]).abs() < 1e-13 && (batch[k] - x[k]).abs() < 1e-13);
+            }
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! Factors and columns of inverses, kept between steps.
+//!
+//! Everything is keyed by the exact bits it was made from, so a fresh cache gives the same bits as
+//! an old one; it only takes longer.
+
+use super::clusters::Clusters;
+use super::compliance_columns::ComplianceColumns;
+use super::factor::{BATCH, FactorScratch, Symbolic};
+use super::factor_values::Factor;
+use super::operator::StiffnessOperator;
+use super::system;
+use super::system::FactorKey;
+use crate::body::{DeformableBody, Solver};
+use crate::fem::constant_matrix::laplacian_weight;
+use crate::fem::{DeformableModel, SystemMatrix};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// A body's matrix, factored, with the columns of its inverse that contacts have asked for.
+pub(crate) struct SystemFactor {
+    pub symbolic: Arc<Symbolic>,
+    pub factor: Factor,
+    pub system: SystemMatrix,
+    pub columns: ComplianceColumns,
+    pub clusters: Option<Clusters>,
+    /// Different for every factor that a cache, or an island, has made.
+    pub serial: u64,
+}
+
+/// A factor that is kept.
+struct Entry {
+    made: SystemFactor,
+    key: FactorKey,
+    model: Arc<DeformableModel>,
+    last_used: u64,
+}
+
+/// Where a cache keeps a factor, for the present step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct FactorId(usize);
+
+/// All factors of a world.
+#[derive(Default)]
+pub(crate) struct FactorCache {
+    /// By model, matrix, and whether it is put together.
+    symbolic: HashMap<(u64, SystemMatrix, bool), Arc<Symbolic>>,
+    factors: Vec<Entry>,
+    places: HashMap<FactorKey, usize>,
+    scratch: FactorScratch,
+    ages: Vec<u64>,
+    step: u64,
+    made: u64,
+}
+
+/// What a call of [`FactorCache::prepare`] had to do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct CacheWork {
+    pub id: FactorId,
+    pub factorizations: usize,
+    pub columns: usize,
+}
+
+/// Steps after which an unused factor is dropped: two seconds at game speed.
+const UNUSED_STEPS: u64 = 120;
+/// Unused factors that are kept at all.
+const MAX_UNUSED: usize = 8;
+
+impl FactorCache {
+    /// Starts a step: forgets factors that nobody used for a while, and, least recently used first,
+    /// columns beyond the budget \[bytes\].
+    pub fn begin_step(&mut self, column_budget: usize) {
+        self.step += 1;
+        let oldest = self.step.saturating_sub(UNUSED_STEPS);
+        self.forget_before(oldest);
+        // A material or a step that changes all the time must not fill the memory with old factors.
+        let now = self.step;
+        self.ages.clear();
+        self.ages.extend(self.factors.iter().map(|f| f.last_used).filter(|used| used + 1 < now));
+        if self.ages.len() > MAX_UNUSED {
+            self.ages.sort_unstable();
+            let cutoff = self.ages[self.ages.len() - MAX_UNUSED];
+            self.forget_before(cutoff);
+        }
+        while self.column_bytes() > column_budget {
+            let idle = |f: &&mut Entry| f.made.columns.bytes() > 0;
+            let Some(oldest) = self.factors.iter_mut().filter(idle).min_by_key(|f| (f.last_used, f.model.id))
+            else {
+                return;
+            };
+            oldest.made.columns.clear();
+        }
+    }
+
+    /// Forgets factors that were last used before this step.
+    fn forget_before(&mut self, oldest: u64) {
+        if self.factors.iter().all(|f| f.last_used >= oldest) {
+            return;
+        }
+        self.factors.retain(|f| f.last_used >= oldest);
+        self.places.clear();
+        self.places.extend(self.factors.iter().enumerate().map(|(place, f)| (f.key.clone(), place)));
+        self.symbolic.retain(|(model, ..), _| self.factors.iter().any(|f| f.key.model == *model));
+    }
+
+    /// Makes sure the factor of a body and the inverse's columns at these surface nodes are there.
+    /// `None` when the matrix is not positive definite in double precision.
+    pub fn prepare(
+        &mut self,
+        key: &FactorKey,
+        body: &DeformableBody,
+        h: f64,
+        surface_nodes: impl Iterator<Item = u32>,
+    ) -> Option<CacheWork> {
+        let mut work = CacheWork::default();
+        if !self.places.contains_key(key) {
+            let has_matrix = key.solver != Solver::ConjugateGradients;
+            let name = (key.model, key.system, has_matrix);
+            let symbolic = match self.symbolic.get(&name) {
+                Some(symbolic) => symbolic.clone(),
+                None => {
+                    let made = match has_matrix {
+                        true => system::pattern_of(&body.model, key.system)?,
+                        false => {
+                            let d = system::dimension(key.system);
+                            Symbolic::without_matrix(d, body.model.rest.len())
+                        }
+                    };
+                    let made = Arc::new(made);
+                    self.symbolic.insert(name, made.clone());
+                    made
+                }
+            };
+            let assembled =
+                || system::assemble(&body.model, &body.material, &key.pins, key.system, h, &symbolic);
+            let factor = match key.solver {
+                Solver::Projective => {
+                    let values = assembled();
+                    let factor = symbolic.factorize(&values, &mut self.scratch).ok()?;
+                    let is_single =
+                        system::in_single_precision(body, !key.pins.is_empty(), h, &symbolic, &values);
+                    if is_single { factor.rounded() } else { factor }
+                }
+                Solver::ConjugateGradients => {
+                    let (model, material) = (&body.model, &body.material);
+                    let operator = StiffnessOperator::new(model, material, &key.pins, key.system, h);
+                    Factor::Iterative(Box::new(operator))
+                }
+                Solver::GaussSeidel => Factor::GaussSeidel(assembled()),
+                // Newton's method makes its own, and falls back on this.
+                Solver::Jacobi | Solver::Newton => {
+                    Factor::Jacobi(symbolic.upper(&assembled()).inverse_row_sums())
+                }
+            };
+            work.factorizations = 1;
+            let columns = ComplianceColumns::new(&body.model.surface, key.system);
+            let clusters = (key.clusters > 0).then(|| {
+                let weight = laplacian_weight(&body.material) * system::stiffening(&body.material, h);
+                let (pins, scratch) = (&key.pins, &mut self.scratch);
+                Clusters::new(&body.model, key.clusters, weight, pins, &symbolic, &factor, scratch)
+            });
+            let serial = self.made;
+            let made = Entry {
+                made: SystemFactor { symbolic, factor, system: key.system, columns, clusters, serial },
+                key: key.clone(),
+                model: body.model.clone(),
+                last_used: self.step,
+            };
+            self.made += 1;
+            self.places.insert(key.clone(), self.factors.len());
+            self.factors.push(made);
+        }
+        work.id = FactorId(*self.places.get(key)?);
+        let entry = &mut self.factors[work.id.0];
+        entry.last_used = self.step;
+        let Entry { made: SystemFactor { symbolic, factor, columns, .. }, model, .. } = entry;
+        work.columns = columns.prepare(model, &key.pins, symbolic, factor, surface_nodes, &mut self.scratch);
+        Some(work)
+    }
+
+    /// Makes the columns of the first of these surface nodes that have none: one batch of them, so that
+    /// a coming touch finds them there. Returns how many.
+    pub fn prepare_ahead(&mut self, id: FactorId, pins: &[u32], surface_nodes: &[u32]) -> usize {
+        let Entry { made, model, .. } = &mut self.factors[id.0];
+        let SystemFactor { symbolic, factor, columns, system, .. } = made;
+        let missing = surface_nodes.iter().copied().filter(|s| !columns.has(*s));
+        let batch: Vec<u32> = missing.take(BATCH / system::dimension(*system)).collect();
+        columns.prepare(model, pins, symbolic, factor, batch.into_iter(), &mut self.scratch)
+    }
+
+    /// A factor that was prepared in this step.
+    pub fn get(&self, id: FactorId) -> &SystemFactor {
+        &self.factors[id.0].made
+    }
+
+    /// Bytes of all numeric factors.
+    pub fn factor_bytes(&self) -> usize {
+        let bytes = |f: &Entry| f.made.factor.bytes() + f.made.clusters.as_ref().map_or(0, Clusters::bytes);
+        self.factors.iter().map(bytes).sum()
+    }
+
+    /// Bytes of all columns.
+    pub fn column_bytes(&self) -> usize {
+        self.factors.iter().map(|f| f.made.columns.bytes()).sum()
+    }
+}

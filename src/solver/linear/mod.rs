@@ -1,0 +1,37 @@
+//! Linear algebra: the constant matrix, what stands for its inverse, and the preconditioner that both make.
+
+mod supernodes;
+
+mod gauss_seidel;
+mod operator;
+
+mod factor_values;
+
+mod factor;
+mod solves;
+
+mod block_matrix;
+
+mod system;
+
+mod clusters;
+mod compliance_columns;
+
+mod factor_cache;
+
+mod rigid_mode;
+
+mod preconditioner;
+
+pub(crate) use block_matrix::{BlockFactor, BlockMatrix};
+pub(crate) use compliance_columns::ComplianceColumns;
+pub(crate) use factor::{FactorScratch, Symbolic};
+
+pub(crate) use factor_cache::{FactorCache, FactorId, SystemFactor};
+pub(crate) use preconditioner::Preconditioner;
+pub(crate) use system::{FactorKey, assemble_tangent};
+#[cfg(test)]
+pub(crate) use {
+    operator::{ConjugateScratch, StiffnessOperator},
+    system::{assemble, pattern_of},
+};

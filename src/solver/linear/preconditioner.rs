@@ -1,0 +1,297 @@
+//! The preconditioner of the global step: `P = Q A⁻¹ Qᵀ` with rotating frames Q around the constant factor.
+//!
+//! One frame per node does not know that the body as a whole may be pushed without strain. That
+//! mode is put back exactly: with masses m_i (total m), 1 the rigid translation,
+//! `P = (I − 1mᵀ/m) P₀ (I − m1ᵀ/m) + h²/(1 + αh)/m · 11ᵀ`.
+//!
+//! Frames are rounded to about 10⁻⁶ rad. That costs no convergence to speak of, and at rest they
+//! are the same bits in every step, so whatever was made from them can be used again.
+
+use super::clusters::TurnedClusters;
+use super::factor::FactorScratch;
+use super::factor_cache::SystemFactor;
+use super::rigid_mode::RigidMode;
+use crate::fem::{DeformableModel, SystemMatrix, node_rotations};
+use crate::math::lanes::Lane;
+use crate::math::{Mat3, Vec3, rounded_rotation};
+use crate::solver::counters::SolveCounters;
+use std::time::Instant;
+
+/// Binary places of the frames' quaternions.
+const FRAME_BITS: i32 = 20;
+
+/// Frames of one body and what follows from them.
+#[derive(Default)]
+pub(crate) struct Preconditioner {
+    kind: FrameKind,
+    floating: Mat3,
+    per_node: Vec<Mat3>,
+    deflation: Deflation,
+    rigid: RigidMode,
+    clusters: TurnedClusters,
+    /// The clusters take part.
+    turns: bool,
+    rhs: Vec<Lane>,
+    balanced: Vec<Vec3>,
+    scratch: FactorScratch,
+    /// Of the solves.
+    pub counters: SolveCounters,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum FrameKind {
+    /// The Laplacian: the same in all directions.
+    #[default]
+    Isotropic,
+    Floating,
+    PerNode,
+    /// None: the body keeps its shape.
+    Rigid,
+}
+
+/// The translation mode of per-node frames.
+#[derive(Default)]
+struct Deflation {
+    active: bool,
+    /// `G_i = Σ_k P₀_ik m_k`.
+    coupling: Vec<Mat3>,
+    /// `Σ_i m_i G_i`.
+    mean: Mat3,
+    /// What they were made from: a factor's serial and frames.
+    made_from: (Option<u64>, Vec<Mat3>),
+    masses: Vec<f64>,
+    total_mass: f64,
+    /// h²/(1 + αh) [s²].
+    mobility: f64,
+    push: Vec<Vec3>,
+    column: Vec<Vec3>,
+}
+
+impl Preconditioner {
+    /// The body keeps its shape.
+    pub fn set_rigid(&mut self, x: &[Vec3], masses: &[f64], mobility: f64) {
+        self.kind = FrameKind::Rigid;
+        self.turns = false;
+        self.deflation.active = false;
+        self.rigid.set(x, masses, mobility);
+    }
+
+    /// The scalar matrix: no frames.
+    pub fn set_isotropic(&mut self) {
+        self.kind = FrameKind::Isotropic;
+        self.turns = false;
+        self.floating = Mat3::identity();
+        self.deflation.active = false;
+    }
+
+    /// One frame for the body.
+    pub fn set_floating(&mut self, rotation: &Mat3) {
+        self.kind = FrameKind::Floating;
+        self.turns = false;
+        self.floating = rounded_rotation(rotation, FRAME_BITS);
+        self.deflation.active = false;
+    }
+
+    /// Lets the clusters of the Laplacian turn along, if the factor has such, from where they are at `x`.
+    pub fn set_clusters(&mut self, factor: &SystemFactor, x: &[Vec3]) {
+        let clusters = factor.clusters.as_ref();
+        self.turns = clusters.is_some_and(|clusters| self.clusters.turn(clusters, x));
+    }
+
+    /// Turns the body's one frame to `rotation` if that differs by more than `angle` \[rad\]; true if so.
+    pub fn turn_floating(&mut self, rotation: &Mat3, angle: f64) -> bool {
+        if self.kind != FrameKind::Floating {
+            return false;
+        }
+        // ‖R − Q‖ = 2√2 sin(θ/2).
+        let differs = (rotation - self.floating).norm() > angle * std::f64::consts::SQRT_2;
+        if differs {
+            let (before, active) = (self.floating, self.deflation.active);
+            self.set_floating(rotation);
+            if active {
+                let turn = self.floating * before.transpose();
+                let d = &mut self.deflation;
+                d.coupling.iter_mut().for_each(|g| *g = turn * *g * turn.transpose());
+                d.mean = turn * d.mean * turn.transpose();
+                // Turned numbers are not those that a fresh solve would give.
+                d.made_from.0 = None;
+                d.active = true;
+            }
+        }
+        differs
+    }
+
+    /// One frame per node, of the elements at `x`; free bodies (without pins) get their
+    /// translation mode back.
+    pub fn set_per_node(
+        &mut self,
+        model: &DeformableModel,
+        x: &[Vec3],
+        masses: &[f64],
+        mobility: f64,
+        is_free: bool,
+        factor: &SystemFactor,
+    ) {
+        self.kind = FrameKind::PerNode;
+        self.turns = false;
+        self.per_node.resize(x.len(), Mat3::zeros());
+        node_rotations(model, x, &mut self.per_node);
+        self.per_node.iter_mut().for_each(|q| *q = rounded_rotation(q, FRAME_BITS));
+        self.deflation.active = false;
+        if is_free {
+            self.deflate(masses, mobility, factor);
+        }
+    }
+
+    /// Puts the translation mode back, of free bodies with frames per node or without a factor.
+    pub fn deflate(&mut self, masses: &[f64], mobility: f64, factor: &SystemFactor) {
+        let frames = match self.kind {
+            FrameKind::PerNode => &self.per_node[..],
+            _ => std::slice::from_ref(&self.floating),
+        };
+        let (serial, before) = &self.deflation.made_from;
+        if *serial == Some(factor.serial) && before == frames {
+            self.deflation.active = true;
+            return;
+        }
+        let frames = frames.to_vec();
+        let mut d = std::mem::take(&mut self.deflation);
+        d.coupling.clear();
+        d.coupling.resize(masses.len(), Mat3::zeros());
+        d.column.resize(masses.len(), Vec3::zeros());
+        for c in 0..3 {
+            d.push.clear();
+            d.push.extend(masses.iter().map(|m| Vec3::ith(c, *m)));
+            self.rotate_and_solve(factor, &d.push, &mut d.column);
+            for (g, v) in d.coupling.iter_mut().zip(&d.column) {
+                g.set_column(c, v);
+            }
+        }
+        let mean = d.coupling.iter().zip(masses).fold(Mat3::zeros(), |sum, (g, m)| sum + g * *m);
+        d.mean = (mean + mean.transpose()) * 0.5;
+        d.made_from = (Some(factor.serial), frames);
+        d.active = true;
+        d.masses.clear();
+        d.masses.extend_from_slice(masses);
+        d.total_mass = masses.iter().sum();
+        d.mobility = mobility;
+        self.deflation = d;
+    }
+
+    /// `out = P r`: displacements \[m\] of forces \[N\].
+    pub fn apply(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
+        if self.kind == FrameKind::Rigid {
+            return self.rigid.apply(r, out);
+        }
+        if !self.deflation.active {
+            self.rotate_and_solve(factor, r, out);
+            if let Some(clusters) = factor.clusters.as_ref().filter(|_| self.turns) {
+                self.clusters.add(clusters, r, out);
+            }
+            return;
+        }
+        let sum: Vec3 = r.iter().sum();
+        let d = std::mem::take(&mut self.deflation);
+        let acceleration = sum / d.total_mass;
+        let mut balanced = std::mem::take(&mut self.balanced);
+        balanced.clear();
+        balanced.extend(r.iter().zip(&d.masses).map(|(r, m)| r - acceleration * *m));
+        self.rotate_and_solve(factor, &balanced, out);
+        self.balanced = balanced;
+        let drift = out.iter().zip(&d.masses).fold(Vec3::zeros(), |a, (o, m)| a + o * *m) / d.total_mass;
+        let shift = acceleration * d.mobility - drift;
+        out.iter_mut().for_each(|o| *o += shift);
+        self.deflation = d;
+    }
+
+    /// `out = Q A⁻¹ Qᵀ r`.
+    fn rotate_and_solve(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
+        let start = Instant::now();
+        let Self { rhs, scratch, .. } = self;
+        match (factor.system, self.kind) {
+            (SystemMatrix::Laplacian, _) => {
+                solve_turned(factor, |_, v| v, |_, v| v, r, out, rhs, scratch);
+            }
+            (SystemMatrix::RestStiffness, FrameKind::PerNode) => {
+                let frames = &self.per_node;
+                solve_turned(factor, |i, v| frames[i].tr_mul(&v), |i, v| frames[i] * v, r, out, rhs, scratch);
+            }
+            (SystemMatrix::RestStiffness, _) => {
+                let frame = &self.floating;
+                solve_turned(factor, |_, v| frame.tr_mul(&v), |_, v| frame * v, r, out, rhs, scratch);
+            }
+        }
+        self.counters.solves += 1;
+        self.counters.solve_bytes += 2 * factor.factor.bytes();
+        self.counters.linear_time += start.elapsed();
+    }
+
+    /// The frame of a node.
+    fn frame(&self, node: usize) -> Mat3 {
+        match self.kind {
+            FrameKind::Isotropic | FrameKind::Rigid => Mat3::identity(),
+            FrameKind::Floating => self.floating,
+            FrameKind::PerNode => self.per_node[node],
+        }
+    }
+
+    /// The block of P between two surface nodes, given the one of `A⁻¹` [m/N].
+    pub fn compliance(&self, factor: &SystemFactor, inverse_block: &Mat3, i: usize, j: usize) -> Mat3 {
+        if self.kind == FrameKind::Rigid {
+            return self.rigid.compliance(i, j);
+        }
+        let block = match self.kind {
+            FrameKind::Isotropic if self.turns => match &factor.clusters {
+                Some(clusters) => inverse_block + self.clusters.compliance(clusters, i, j),
+                None => *inverse_block,
+            },
+            FrameKind::Isotropic => *inverse_block,
+            _ => self.frame(i) * inverse_block * self.frame(j).transpose(),
+        };
+        let d = &self.deflation;
+        if !d.active {
+            return block;
+        }
+        let rigid =
+            d.mean / (d.total_mass * d.total_mass) + Mat3::from_diagonal_element(d.mobility / d.total_mass);
+        block - (d.coupling[i] + d.coupling[j].transpose()) / d.total_mass + rigid
+    }
+
+    /// The one frame of the body, if it has one and that is all there is to its blocks.
+    pub fn one_frame(&self) -> Option<Mat3> {
+        match self.kind {
+            _ if self.deflation.active || self.turns => None,
+            FrameKind::Isotropic => Some(Mat3::identity()),
+            FrameKind::Floating => Some(self.floating),
+            FrameKind::PerNode | FrameKind::Rigid => None,
+        }
+    }
+
+    /// Whether every node has a frame of its own, as in bodies that bend.
+    pub fn is_per_node(&self) -> bool {
+        self.kind == FrameKind::PerNode
+    }
+}
+
+/// `out = Q A⁻¹ Qᵀ r`, node by node: `turn_back` is Qᵀ, `turn` is Q.
+fn solve_turned(
+    factor: &SystemFactor,
+    turn_back: impl Fn(usize, Vec3) -> Vec3,
+    turn: impl Fn(usize, Vec3) -> Vec3,
+    r: &[Vec3],
+    out: &mut [Vec3],
+    rhs: &mut Vec<Lane>,
+    scratch: &mut FactorScratch,
+) {
+    rhs.resize(r.len(), Lane::default());
+    let places = factor.symbolic.places();
+    for (i, (r, &place)) in r.iter().zip(places).enumerate() {
+        let turned = turn_back(i, *r);
+        rhs[place] = Lane([turned.x, turned.y, turned.z, 0.0]);
+    }
+    factor.symbolic.solve(&factor.factor, rhs, scratch);
+    for (i, (out, &place)) in out.iter_mut().zip(places).enumerate() {
+        let [x, y, z, _] = rhs[place].0;
+        *out = turn(i, Vec3::new(x, y, z));
+    }
+}

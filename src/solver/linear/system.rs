@@ -1,0 +1,226 @@
+//! The constant matrix of the global step, assembled.
+//!
+//! Rest stiffness: `A = (1 + αh) M/h² + (1 + β/h) K₀`, `K₀_ab = Σ_e V[μ((g_a·g_b)I + g_b g_aᵀ) + λ g_a g_bᵀ]`.
+//! Laplacian: `A = (1 + αh) M/h² + (1 + β/h) Σ_e w V GᵀG` [Bouaziz et al. 2014]. Sheets, rods and
+//! springs are in both as in the latter. Newton's method has the Hessian at a state in its place.
+//! A pinned node has the identity for its row and column, so every set of pins shares one symbolic
+//! factor.
+
+use super::factor::Symbolic;
+use crate::body::{DeformableBody, FactorPrecision, Solver};
+use crate::fem::constant_matrix::add_blocks;
+use crate::fem::{DeformableModel, Elements, SystemMatrix, add_tangents};
+use crate::material::DeformableMaterial;
+use crate::math::{Mat3, Vec3};
+
+/// Everything a numeric factor depends on: it is valid for any body that agrees in all of it.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct FactorKey {
+    pub model: u64,
+    pub solver: Solver,
+    pub system: SystemMatrix,
+    precision: FactorPrecision,
+    pub clusters: usize,
+    elasticity: crate::energy::Elasticity,
+    /// Bits of h, E, ν, ρ, α, β, and the modulus of fibres.
+    bits: [u64; 7],
+    /// Pinned nodes, ascending.
+    pub pins: Vec<u32>,
+}
+
+impl FactorKey {
+    pub fn new(body: &DeformableBody, h: f64) -> Self {
+        let mut key = Self {
+            model: body.model.id,
+            solver: Solver::default(),
+            system: SystemMatrix::default(),
+            precision: FactorPrecision::default(),
+            clusters: 0,
+            elasticity: body.material.elasticity,
+            bits: [0; 7],
+            pins: Vec::new(),
+        };
+        key.update(body, h);
+        key
+    }
+
+    /// The key of a body at a step of `h` \[s\], in the memory of another.
+    pub fn update(&mut self, body: &DeformableBody, h: f64) {
+        let m = &body.material;
+        let [e, nu, rho] = [m.youngs_modulus, m.poisson_ratio, m.density];
+        self.model = body.model.id;
+        self.solver = body.settings().solver;
+        self.system = match self.solver {
+            Solver::Newton => SystemMatrix::RestStiffness,
+            _ => body.settings().system,
+        };
+        self.precision = body.settings().precision;
+        self.clusters = match self.system {
+            SystemMatrix::Laplacian if body.model.is_solid() => body.settings().clusters,
+            _ => 0,
+        };
+        self.elasticity = m.elasticity;
+        self.bits = [h, e, nu, rho, m.mass_damping, m.stiffness_damping, m.fibre_modulus].map(f64::to_bits);
+        self.pins.clear();
+        self.pins.extend(body.pins.iter().map(|p| p.node));
+    }
+}
+
+/// Unknowns per node.
+pub(crate) fn dimension(system: SystemMatrix) -> usize {
+    match system {
+        SystemMatrix::RestStiffness => 3,
+        SystemMatrix::Laplacian => 1,
+    }
+}
+
+/// The sparsity of a body's matrix.
+pub(crate) fn pattern_of(model: &DeformableModel, system: SystemMatrix) -> Option<Symbolic> {
+    let (mut starts, mut rows) = (vec![0], Vec::new());
+    for i in 0..model.rest.len() {
+        rows.extend(model.coupling[i].iter().map(|&j| j as usize).filter(|&j| j < i));
+        rows.push(i);
+        starts.push(rows.len());
+    }
+    Symbolic::new(dimension(system), starts, rows)
+}
+
+/// The values of a body's constant matrix, in the order of [`Symbolic::rows`].
+pub(crate) fn assemble(
+    model: &DeformableModel,
+    material: &DeformableMaterial,
+    pins: &[u32],
+    system: SystemMatrix,
+    h: f64,
+    symbolic: &Symbolic,
+) -> Vec<f64> {
+    let mut matrix = Upper::new(model, material, pins, system, h, symbolic);
+    let stiffening = stiffening(material, h);
+    let elements = Elements { model, material, activation: 1.0 };
+    add_blocks(&elements, system, |i, j, block| matrix.add_elastic(i, j, &(block * stiffening)));
+    matrix.values
+}
+
+/// Factor of stiffness damping on the elastic part of the matrix, 1 + β/h.
+pub(crate) fn stiffening(material: &DeformableMaterial, h: f64) -> f64 {
+    1.0 + material.stiffness_damping / h
+}
+
+/// Inertia per volume in the matrix, (1 + αh) ρ/h² [N/m per m³].
+pub(crate) fn inertia(material: &DeformableMaterial, h: f64) -> f64 {
+    material.density * (1.0 + material.mass_damping * h) / (h * h)
+}
+
+/// The values of a body's Hessian at `x`, in the order of [`Symbolic::rows`], of `3n` unknowns. Of stiffness
+/// damping it has the leading part, β/h of the elastic one.
+pub(crate) fn assemble_tangent(
+    elements: &Elements<'_>,
+    x: &[Vec3],
+    projected: bool,
+    pins: &[u32],
+    h: f64,
+    symbolic: &Symbolic,
+) -> Vec<f64> {
+    let Elements { model, material, .. } = elements;
+    let mut matrix = Upper::new(model, material, pins, SystemMatrix::RestStiffness, h, symbolic);
+    let stiffening = stiffening(material, h);
+    add_tangents(elements, x, projected, |i, j, block| matrix.add_elastic(i, j, &(block * stiffening)));
+    matrix.values
+}
+
+/// Condition up to which a single-precision factor serves by itself: the softest mode is then off by
+/// less than a hundredth, which is less than an iteration leaves of the error anyway.
+const SINGLE_CONDITION: f64 = 1.0e5;
+/// Bytes of a factor that fit into a cache: beyond, solves wait for memory.
+const CACHED_BYTES: usize = 4 << 20;
+
+/// Whether the numbers of a body's factor are rounded to single precision.
+pub(crate) fn in_single_precision(
+    body: &DeformableBody,
+    is_pinned: bool,
+    h: f64,
+    symbolic: &Symbolic,
+    values: &[f64],
+) -> bool {
+    match body.settings().precision {
+        FactorPrecision::Double => false,
+        FactorPrecision::Single => true,
+        FactorPrecision::Automatic => {
+            is_pinned
+                && symbolic.factor_len() * size_of::<f64>() > CACHED_BYTES
+                && condition(body, h, symbolic, values) < SINGLE_CONDITION
+        }
+    }
+}
+
+/// An estimate: the largest row sum over what a body moving as a whole meets, the mean inertia.
+fn condition(body: &DeformableBody, h: f64, symbolic: &Symbolic, values: &[f64]) -> f64 {
+    let starts = symbolic.column_starts();
+    let mut sums = vec![0.0; starts.len() - 1];
+    for j in 0..sums.len() {
+        for k in starts[j]..starts[j + 1] {
+            let i = symbolic.rows()[k];
+            sums[i] += values[k].abs();
+            if i != j {
+                sums[j] += values[k].abs();
+            }
+        }
+    }
+    let largest = sums.into_iter().fold(0.0, f64::max);
+    largest * h * h * body.model.rest.len() as f64 / body.mass()
+}
+
+/// The upper triangle being filled, block by block.
+struct Upper<'a> {
+    symbolic: &'a Symbolic,
+    values: Vec<f64>,
+    pinned: Vec<bool>,
+    d: usize,
+}
+
+impl<'a> Upper<'a> {
+    /// With the inertia in it, and the identity for pinned nodes.
+    fn new(
+        model: &DeformableModel,
+        material: &DeformableMaterial,
+        pins: &[u32],
+        system: SystemMatrix,
+        h: f64,
+        symbolic: &'a Symbolic,
+    ) -> Self {
+        let mut pinned = vec![false; model.rest.len()];
+        pins.iter().for_each(|&p| pinned[p as usize] = true);
+        let values = vec![0.0; symbolic.rows().len()];
+        let mut matrix = Self { symbolic, values, pinned, d: dimension(system) };
+        let inertia = inertia(material, h);
+        for (j, &volume) in model.node_volumes.iter().enumerate() {
+            let diagonal = if matrix.pinned[j] { 1.0 } else { inertia * volume };
+            matrix.add(j, j, &Mat3::from_diagonal_element(diagonal));
+        }
+        matrix
+    }
+
+    /// Adds a block between nodes i and j if it is one of the lower triangle and neither is pinned.
+    fn add_elastic(&mut self, i: usize, j: usize, block: &Mat3) {
+        if i >= j && !self.pinned[i] && !self.pinned[j] {
+            self.add(i, j, block);
+        }
+    }
+
+    /// Adds the block between row node i and column node j ≤ i of the symmetric matrix, where it
+    /// stands above the diagonal: transposed.
+    fn add(&mut self, i: usize, j: usize, block: &Mat3) {
+        let d = self.d;
+        let starts = self.symbolic.column_starts();
+        // The block stands at the same place in all of its columns.
+        let first = starts[d * i]..starts[d * i + 1];
+        let Ok(place) = self.symbolic.rows()[first].binary_search(&(d * j)) else { return };
+        for r in 0..d {
+            let column = starts[d * i + r] + place;
+            let count = if i == j { r + 1 } else { d };
+            for c in 0..count {
+                self.values[column + c] += block[(r, c)];
+            }
+        }
+    }
+}
