@@ -1,6 +1,6 @@
 //! Draws the picture at the head of the README: `cargo run --release --example picture`.
 //!
-//! A stack falls, is pressed most, and lies at rest: three moments of one run, side by side. Arrows are the forces
+//! A stack falls, is pressed by the impact, and lies at rest: three moments of one run, side by side. Arrows are the forces
 //! that carry the soft bodies from below. Writes `docs/picture.png`, or the path it is given.
 
 mod render;

@@ -1,4 +1,4 @@
-//! A steel plate and a crate fall on two soft cubes, and a softer one on top of them.
+//! A heavy plate and a crate fall on two soft cubes, and a softer one on top of them.
 
 use crate::render::{Color, Paint, Soup};
 use foible3d::prelude::*;
@@ -6,7 +6,7 @@ use rapier3d::parry::shape::{Cone, Cylinder};
 use rapier3d::prelude::*;
 
 const RATE: f32 = 120.0;
-const STEEL: Paint = Paint { color: Color::new(0.38, 0.40, 0.43), edges: 0.0 };
+const GREY: Paint = Paint { color: Color::new(0.38, 0.40, 0.43), edges: 0.0 };
 const ARROW: Paint = Paint { color: Color::new(0.55, 0.0, 0.03), edges: 0.0 };
 /// Length of an arrow per newton \[m\], and the least upward force that is drawn \[N\].
 const METRES_PER_NEWTON: f32 = 1.6e-2;
@@ -17,7 +17,7 @@ pub struct Stack {
     physics: PhysicsWorld,
     world: DeformableWorld,
     paints: Vec<(DeformableBodyHandle, Paint)>,
-    steel: Vec<(ColliderHandle, Vector)>,
+    rigid: Vec<(ColliderHandle, Vector)>,
 }
 
 impl Stack {
@@ -26,14 +26,14 @@ impl Stack {
         physics.integration_parameters.dt = 1.0 / RATE;
         let ground = RigidBodyBuilder::fixed().translation(Vector::NEG_Y * 0.5);
         physics.insert(ground, ColliderBuilder::cuboid(4.0, 0.5, 4.0).friction(0.9));
-        let mut steel = Vec::new();
+        let mut rigid = Vec::new();
         for (half, at, density) in [
             (Vector::new(0.27, 0.018, 0.13), Vector::new(0.0, 0.33, 0.0), 4500.0),
             (Vector::splat(0.075), Vector::new(0.0, 0.47, 0.0), 2500.0),
         ] {
             let body = RigidBodyBuilder::dynamic().translation(at);
             let shape = ColliderBuilder::cuboid(half.x, half.y, half.z).density(density).friction(0.6);
-            steel.push((physics.insert(body, shape).1, half));
+            rigid.push((physics.insert(body, shape).1, half));
         }
         let mut world = DeformableWorld::new();
         let rubber =
@@ -52,7 +52,7 @@ impl Stack {
         ] {
             paints.push((world.insert(body.translation(at))?, paint));
         }
-        Ok(Self { physics, world, paints, steel })
+        Ok(Self { physics, world, paints, rigid })
     }
 
     pub fn run(&mut self, seconds: f32) {
@@ -72,10 +72,10 @@ impl Stack {
             let body = &self.world.bodies[*handle];
             solids.add(body.positions().map(|x| x + offset), body.model().surface_triangles(), *paint);
         }
-        for (handle, half) in &self.steel {
+        for (handle, half) in &self.rigid {
             let pose = *self.physics.colliders[*handle].position();
             let (vertices, triangles) = Cuboid::new(*half).to_trimesh();
-            solids.add(vertices.into_iter().map(|x| pose * x + offset), triangles, STEEL);
+            solids.add(vertices.into_iter().map(|x| pose * x + offset), triangles, GREY);
         }
         for contact in self.world.contacts().iter().filter(|c| c.force.y > LEAST_FORCE) {
             draw_arrow(arrows, contact.point + offset, contact.force * METRES_PER_NEWTON);
