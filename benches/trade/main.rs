@@ -1,13 +1,14 @@
 //! What accuracy costs: every method of the ladder of solvers over a set of scenes, against Newton's method and
 //! rapier's own soft bodies. `cargo bench --bench trade`; `-- NAME` for the scenes of
-//! that name alone, or the tables of `presets` or `steps`.
+//! that name alone, or the tables of `presets` or `steps`; `-- plot` draws `target/trade.csv` again without a run.
 //!
-//! Prints tables, writes `target/trade.csv` and `target/trade.svg`. One thread: a scene has one island. Error:
-//! of paths the root mean square distance from the reference's at the same step and mesh, of shapes at rest that at
-//! the end, both over the largest displacement of the reference. The reference is Newton's method to
-//! 1e-10 up to 1000 tetrahedra, and beyond the default solver to 1e-9, which comes to the same
+//! Prints tables, writes `target/trade.csv` and `target/trade.svg` (that of `docs/` is a copy). One thread: a scene
+//! has one island. Error: of paths the root mean square distance from the reference's at the same step and mesh, of
+//! shapes at rest that at the end, both over the largest displacement of the reference. The reference is Newton's
+//! method to 1e-10 up to 1000 tetrahedra, and beyond the default solver to 1e-9, which comes to the same
 //! (`tests/solvers.rs`).
 
+mod labels;
 mod methods;
 mod plot;
 mod rapier;
@@ -20,38 +21,34 @@ use methods::{Choice, Method, methods, presets, reference};
 use scenes::{Kind, Measure, Record, Scene, scenes};
 use std::fmt::Write as _;
 
-/// One run of one method in one scene.
-struct Point {
-    scene: String,
-    family: String,
-    method: String,
-    ms: f64,
-    error: f64,
-}
-
 fn main() {
     let mut arguments = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
     let only = arguments.next();
+    let target = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("target");
+    let (table, picture) = (target.join("trade.csv"), target.join("trade.svg"));
+    if only.as_deref() == Some("plot") {
+        plot::draw(&table, &picture).expect("target/trade.csv of a run");
+        return;
+    }
     let is_wanted = |name: &str| only.as_ref().is_none_or(|part| name.contains(part));
     let mut csv = String::from(
         "scene,engine,setting,tets,dt,ms_per_step,worst_ms,error,volume_error,force_error,deepest\n",
     );
-    let mut points = Vec::new();
     for scene in scenes().into_iter().filter(|scene| is_wanted(&scene.name)) {
         let truth = scene.run(&reference(scene.tets()));
         println!("\n{} ({} elements, h = 1/{:.0})", scene.name, scene.tets(), 1.0 / scene.dt);
         for method in methods(&scene) {
             let record = scene.run(&method);
-            report(&scene, &method.family, &method.name, &record, &truth, &mut csv, &mut points);
+            report(&scene, &method.family, &method.name, &record, &truth, &mut csv);
         }
         for setting in rapier::SETTINGS {
             if let Some(record) = rapier::run(&scene, setting) {
-                report(&scene, "rapier", setting, &record, &truth, &mut csv, &mut points);
+                report(&scene, "rapier", setting, &record, &truth, &mut csv);
             }
         }
     }
     if is_wanted("presets") {
-        preset_table(&mut csv, &mut points);
+        preset_table(&mut csv);
     }
     if is_wanted("steps") {
         mesh_table();
@@ -62,21 +59,12 @@ fn main() {
     if only.is_some() {
         return;
     }
-    let target = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("target");
-    std::fs::write(target.join("trade.csv"), csv).expect("target can be written to");
-    plot::draw(&target.join("trade.svg"), &points).expect("target can be written to");
+    std::fs::write(&table, csv).expect("target can be written to");
+    plot::draw(&table, &picture).expect("target can be written to");
     println!("\nwritten to target/trade.csv and target/trade.svg");
 }
 
-fn report(
-    scene: &Scene,
-    family: &str,
-    method: &str,
-    record: &Record,
-    truth: &Record,
-    csv: &mut String,
-    points: &mut Vec<Point>,
-) {
+fn report(scene: &Scene, family: &str, method: &str, record: &Record, truth: &Record, csv: &mut String) {
     let error = record.error(truth, scene.measure);
     println!(
         "  {:<34} {:>8.3} ms {:>8.2} worst  error {:>8.1e}  volume {:>8.1e}  force {:>8.1e}  deepest {:>8.1e} m",
@@ -90,13 +78,6 @@ fn report(
     );
     let engine = if family == "rapier" { "rapier" } else { "foible3d" };
     note(scene, engine, family, method, record, error, csv);
-    points.push(Point {
-        scene: scene.name.clone(),
-        family: family.into(),
-        method: method.into(),
-        ms: record.median(),
-        error,
-    });
 }
 
 /// A line of the CSV.
@@ -124,7 +105,7 @@ fn note(
 }
 
 /// The presets at 1000, 4000 and 16000 tetrahedra: a cantilever let go, and the same at rest.
-fn preset_table(csv: &mut String, points: &mut Vec<Point>) {
+fn preset_table(csv: &mut String) {
     println!("\npresets: swinging and sagging cantilever, ms per step and error");
     for cells in [[20, 3, 3], [32, 5, 5], [50, 8, 8]] {
         let swing = Scene::cantilever("presets swing", cells, 1e6, 0.3, Measure::Path);
@@ -152,7 +133,7 @@ fn preset_table(csv: &mut String, points: &mut Vec<Point>) {
         for setting in rapier::SETTINGS {
             for (scene, truth) in [(&swing, &truths[0]), (&sag, &truths[1])] {
                 if let Some(record) = rapier::run(scene, setting) {
-                    report(scene, "rapier", setting, &record, truth, csv, points);
+                    report(scene, "rapier", setting, &record, truth, csv);
                 }
             }
         }
