@@ -133,7 +133,11 @@ pub(crate) fn solve_lower_transposed[](L: &[f64], x: &mut [f64]) {
 /// Columns from the j-th on, from row `top` down, of a matrix of m rows.
 #[inline(always)]
 fn columns<const N: usize>(A: &[f64], m: usize, j: usize, top: usize) -> [&[f64]; N] {
-    std::array::from_fn(|k| &A[(j + k) * m + top..(j + k + 1) * m])
+    let mut out = [&A[..0]; N];
+    for k in 0..N {
+        out[k] = &A[(j + k) * m + top..(j + k + 1) * m];
+    }
+    out
 }
 
 /// `out += Σ w_k a_k`.
@@ -152,19 +156,19 @@ fn add_columns<const N: usize>(columns: [&[f64]; N], w: [f64; N], out: &mut [f64
 /// `a_k · v`, each as interleaved sums.
 #[inline(always)]
 fn dots<const N: usize>(columns: [&[f64]; N], v: &[f64]) -> [f64; N] {
-    let columns = columns.map(|c| &c[..v.len()]);
+    let n = v.len();
+    let (lanes, rest) = v.as_chunks::<LANES>();
+    let parts = columns.map(|c| c[..n].as_chunks::<LANES>());
     let mut sums = [Lane::default(); N];
-    let whole = v.len() / LANES * LANES;
-    for i in (0..whole).step_by(LANES) {
-        let at = lane(v, i);
+    for i in 0..lanes.len() {
         for k in 0..N {
-            sums[k] = lane(columns[k], i).mul_add(at, sums[k]);
+            sums[k] = Lane(parts[k].0[i]).mul_add(Lane(lanes[i]), sums[k]);
         }
     }
-    let mut out = sums.map(Lane::sum);
-    for i in whole..v.len() {
+    let mut out = kept_apart(sums).map(Lane::sum);
+    for i in 0..rest.len() {
         for k in 0..N {
-            out[k] = columns[k][i].mul_add(v[i], out[k]);
+            out[k] = parts[k].1[i].mul_add(rest[i], out[k]);
         }
     }
     out
@@ -174,32 +178,35 @@ fn dots<const N: usize>(columns: [&[f64]; N], v: &[f64]) -> [f64; N] {
 #[inline(always)]
 fn both<const N: usize>(columns: [&[f64]; N], w: [f64; N], v: &[f64], out: &mut [f64]) -> [f64; N] {
     let n = out.len();
-    let (columns, v) = (columns.map(|c| &c[..n]), &v[..n]);
+    let parts = columns.map(|c| c[..n].as_chunks::<LANES>());
+    let (at, at_rest) = v[..n].as_chunks::<LANES>();
+    let (lanes, rest) = out.as_chunks_mut::<LANES>();
     let mut sums = [Lane::default(); N];
     let weights = w.map(Lane::splat);
-    let whole = n / LANES * LANES;
-    for i in (0..whole).step_by(LANES) {
-        let (at, mut sum) = (lane(v, i), lane(out, i));
+    for i in 0..lanes.len() {
+        let mut sum = Lane(lanes[i]);
         for k in 0..N {
-            let a = lane(columns[k], i);
+            let a = Lane(parts[k].0[i]);
             sum = a.mul_add(weights[k], sum);
-            sums[k] = a.mul_add(at, sums[k]);
+            sums[k] = a.mul_add(Lane(at[i]), sums[k]);
         }
-        out[i..i + LANES].copy_from_slice(&sum.0);
+        lanes[i] = sum.0;
     }
-    let mut products = sums.map(Lane::sum);
-    for i in whole..n {
+    let mut products = kept_apart(sums).map(Lane::sum);
+    for i in 0..rest.len() {
         for k in 0..N {
-            out[i] = columns[k][i].mul_add(w[k], out[i]);
-            products[k] = columns[k][i].mul_add(v[i], products[k]);
+            rest[i] = parts[k].1[i].mul_add(w[k], rest[i]);
+            products[k] = parts[k].1[i].mul_add(at_rest[i], products[k]);
         }
     }
     products
 }
 
+/// The same, out of the optimizer's sight: to save a few operations on the last sums it would turn the lanes
+/// across the columns, with shuffles of all that is read.
 #[inline(always)]
-fn lane(of: &[f64], i: usize) -> Lane {
-    Lane(std::array::from_fn(|l| of[i + l]))
+fn kept_apart<const N: usize>(sums: [Lane; N]) -> [Lane; N] {
+    std::hint::black_box(sums)
 }
 
 #[cfg(test)]
