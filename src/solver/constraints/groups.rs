@@ -9,16 +9,22 @@ use crate::contact::{Constraint, Endpoint};
 pub(crate) struct ContactGroups {
     /// First contact of each group, and the number of contacts last.
     pub starts: Vec<usize>,
-    /// Pairs of groups (constraint, column) of the lower triangle that share something which yields.
+    /// Pairs of groups (row, column) of the lower triangle that share something which yields.
     pub coupled: Vec<(usize, usize)>,
     /// Those pairs, and those that elimination in this order adds.
     pub filled: Vec<(usize, usize)>,
     ends: Vec<[Option<u64>; 2]>,
+    /// The groups by their ends, ascending.
+    known: Vec<([Option<u64>; 2], usize)>,
     group_of_constraint: Vec<usize>,
     sizes: Vec<usize>,
-    /// Adjacency during elimination, constraint by constraint.
+    /// Adjacency during elimination, row by row.
     adjacent: Vec<bool>,
     eliminated: Vec<bool>,
+    /// Contacts of each group and of those adjacent to it, as far as they are not eliminated.
+    degrees: Vec<usize>,
+    /// Groups adjacent to the one that is eliminated.
+    near: Vec<usize>,
     rank: Vec<usize>,
     /// The group at each rank.
     order: Vec<usize>,
@@ -39,10 +45,10 @@ impl ContactGroups {
         let (group_of_constraint, rank) = (&self.group_of_constraint, &self.rank);
         let sorted = group_of_constraint.windows(2).all(|w| rank[w[0]] <= rank[w[1]]);
         if !sorted {
-            let ends = &self.ends;
+            let known = &self.known;
             let rank_of = |constraint: &Constraint| {
-                let own = ends_of(constraint, proxies);
-                ends.iter().position(|e| *e == own).map_or(usize::MAX, |g| rank[g])
+                let found = known.binary_search_by_key(&ends_of(constraint, proxies), |(ends, _)| *ends);
+                found.map_or(usize::MAX, |at| rank[known[at].1])
             };
             constraints.sort_unstable_by(|a, b| rank_of(a).cmp(&rank_of(b)).then(a.key.cmp(&b.key)));
         }
@@ -57,16 +63,20 @@ impl ContactGroups {
 
     fn find(&mut self, constraints: &[Constraint], proxies: &RigidProxies) {
         self.ends.clear();
+        self.known.clear();
         self.sizes.clear();
         self.group_of_constraint.clear();
         for constraint in constraints {
             let ends = ends_of(constraint, proxies);
             let last = self.group_of_constraint.last().copied().filter(|&g: &usize| self.ends[g] == ends);
-            let known = last.or_else(|| self.ends.iter().position(|e| *e == ends));
-            let group = known.unwrap_or_else(|| {
-                self.ends.push(ends);
-                self.sizes.push(0);
-                self.ends.len() - 1
+            let group = last.unwrap_or_else(|| match self.known.binary_search_by_key(&ends, |(e, _)| *e) {
+                Ok(at) => self.known[at].1,
+                Err(at) => {
+                    self.known.insert(at, (ends, self.ends.len()));
+                    self.ends.push(ends);
+                    self.sizes.push(0);
+                    self.ends.len() - 1
+                }
             });
             self.sizes[group] += 1;
             self.group_of_constraint.push(group);
@@ -87,33 +97,34 @@ impl ContactGroups {
 
     /// Least degree first, counted in contacts; ties by index.
     fn eliminate(&mut self) {
-        let groups = self.sizes.len();
-        self.eliminated.clear();
-        self.eliminated.resize(groups, false);
-        self.rank.clear();
-        self.rank.resize(groups, 0);
-        self.order.clear();
-        let mut adjacent = std::mem::take(&mut self.adjacent);
+        let Self { sizes, adjacent, eliminated, degrees, near, rank, order, .. } = self;
+        let groups = sizes.len();
+        eliminated.clear();
+        eliminated.resize(groups, false);
+        degrees.clear();
+        for constraint in adjacent.chunks(groups.max(1)) {
+            degrees.push(constraint.iter().zip(&*sizes).filter(|(a, _)| **a).map(|(_, size)| size).sum());
+        }
+        rank.clear();
+        rank.resize(groups, 0);
+        order.clear();
         for place in 0..groups {
-            let degree = |g: usize| -> usize {
-                let others = (0..groups).filter(|&o| adjacent[g * groups + o] && !self.eliminated[o]);
-                others.map(|o| self.sizes[o]).sum()
-            };
-            let open = (0..groups).filter(|&g| !self.eliminated[g]);
-            let Some(next) = open.min_by_key(|&g| (degree(g), g)) else { break };
-            self.rank[next] = place;
-            self.order.push(next);
-            self.eliminated[next] = true;
-            for a in 0..groups {
-                for b in 0..groups {
-                    let both = adjacent[next * groups + a] && adjacent[next * groups + b];
-                    if both && !self.eliminated[a] && !self.eliminated[b] {
-                        adjacent[a * groups + b] = true;
+            let open = (0..groups).filter(|&g| !eliminated[g]);
+            let Some(next) = open.min_by_key(|&g| (degrees[g], g)) else { break };
+            rank[next] = place;
+            order.push(next);
+            eliminated[next] = true;
+            near.clear();
+            near.extend((0..groups).filter(|&g| adjacent[next * groups + g] && !eliminated[g]));
+            for &a in &*near {
+                degrees[a] -= sizes[next];
+                for &b in &*near {
+                    if !std::mem::replace(&mut adjacent[a * groups + b], true) {
+                        degrees[a] += sizes[b];
                     }
                 }
             }
         }
-        self.adjacent = adjacent;
     }
 
     /// Lists the pairs in the new order.
