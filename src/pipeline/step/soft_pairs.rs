@@ -13,6 +13,8 @@ use std::collections::HashMap;
 pub(super) struct SoftPairDetection {
     /// Boxes of the bodies with their places: those that are stepped first, then those that sleep.
     boxes: Vec<(Aabb, usize)>,
+    /// The one along which they are swept: the longest of the box around them all.
+    axis: usize,
     /// Bodies that sleep beside others, as obstacles until they are woken.
     dormant: Vec<BodyWork>,
     /// Those of the last step, for their memory.
@@ -108,6 +110,7 @@ impl SoftPairDetection {
         self.boxes.extend(works.iter().enumerate().map(|(place, work)| (work.extent, place)));
         self.memory.extend(self.dormant.drain(..).map(|work| (work.handle, work)));
         let Some(all) = self.boxes.iter().map(|(aabb, _)| *aabb).reduce(|a, b| a.merged(&b)) else { return };
+        self.axis = all.extents().max_position();
         for (handle, body) in deformables.iter().filter(|(_, b)| b.is_enabled() && b.is_sleeping()) {
             if body.aabb().loosened(BodyWork::margin(body)).intersects(&all) {
                 let mut work = self.memory.remove(&handle).unwrap_or_else(|| BodyWork::new(handle));
@@ -119,8 +122,8 @@ impl SoftPairDetection {
         self.memory.clear();
     }
 
-    /// Pairs of bodies whose boxes meet, by a sweep along x.
-    fn find_pairs(&mut self, works: &[BodyWork], deformables: &DeformableBodySet) {
+    /// Pairs of bodies whose boxes meet, by a sweep along one axis.
+    fn pair_up(&mut self, works: &[BodyWork], deformables: &DeformableBodySet) {
         self.attached.clear();
         for (_, attachment) in deformables.attachments().filter(|(_, a)| !a.is_broken()) {
             if let [Some(one), Some(other)] = attachment.bodies() {
@@ -128,7 +131,8 @@ impl SoftPairDetection {
             }
         }
         self.attached.sort_unstable();
-        self.boxes.sort_unstable_by(|a, b| a.0.mins.x.total_cmp(&b.0.mins.x).then(a.1.cmp(&b.1)));
+        let axis = self.axis;
+        self.boxes.sort_unstable_by(|a, b| a.0.mins[axis].total_cmp(&b.0.mins[axis]).then(a.1.cmp(&b.1)));
         let dormant = &self.dormant;
         let handle = |place: usize| match works.get(place) {
             Some(work) => work.handle,
@@ -148,7 +152,8 @@ impl SoftPairDetection {
             if own.self_contact() && *place < works.len() {
                 add([*place; 2], pair_of(own, own));
             }
-            let near = self.boxes[i + 1..].iter().take_while(|(other, _)| other.mins.x <= aabb.maxs.x);
+            let near =
+                self.boxes[i + 1..].iter().take_while(|(other, _)| other.mins[axis] <= aabb.maxs[axis]);
             for (_, other) in near.filter(|(other, _)| other.intersects(aabb)) {
                 let mut ends = [*place, *other];
                 if ends.iter().all(|end| *end >= works.len()) {
