@@ -123,7 +123,7 @@ impl SoftPairDetection {
     }
 
     /// Pairs of bodies whose boxes meet, by a sweep along one axis.
-    fn pair_up(&mut self, works: &[BodyWork], deformables: &DeformableBodySet) {
+    fn find_pairs(&mut self, works: &[BodyWork], deformables: &DeformableBodySet) {
         self.attached.clear();
         for (_, attachment) in deformables.attachments().filter(|(_, a)| !a.is_broken()) {
             if let [Some(one), Some(other)] = attachment.bodies() {
