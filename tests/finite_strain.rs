@@ -79,7 +79,7 @@ fn stretched_bars_have_the_stress_of_their_energy() {
             );
             // Uniform: the mesh does not matter. What is left is the tolerance of the iteration.
             assert!(
-                (expected / nominal - 1.0).abs() < 3e-4,
+                (expected / nominal - 1.0).abs() < 1e-5,
                 "{elasticity:?} {stretch}: {expected} {nominal}"
             );
         }
