@@ -224,6 +224,8 @@ fn outcome(
 struct Report {
     csv: String,
     threads: usize,
+    /// Least time over ours of rapier's default solver and of its implicit one, on one thread.
+    least: [f64; 2],
 }
 
 impl Report {
@@ -238,6 +240,10 @@ impl Report {
         note: &str,
     ) {
         let (name, setting) = engine.names();
+        if engine != Engine::Foible && self.threads == 1 {
+            let least = &mut self.least[usize::from(setting != "default")];
+            *least = least.min(outcome.median / base);
+        }
         println!(
             "{scene:<26} {name:<9} {setting:<10} {tets:>6} {:>2} {:>10.3} {:>10.3} {:>7.2} {error:>10.2e} {note}{}{}",
             self.threads,
@@ -401,8 +407,11 @@ fn all(quick: bool, report: &mut Report) {
 
 fn main() {
     let quick = std::env::args().any(|a| a == "quick");
-    let mut report =
-        Report { csv: "scene,engine,setting,tets,threads,ms_per_step,worst_ms,error\n".into(), threads: 1 };
+    let mut report = Report {
+        csv: "scene,engine,setting,tets,threads,ms_per_step,worst_ms,error\n".into(),
+        threads: 1,
+        least: [f64::INFINITY; 2],
+    };
     let available = std::thread::available_parallelism().map_or(1, |n| n.get());
     for threads in if available > 1 { vec![1, available] } else { vec![1] } {
         report.threads = threads;
@@ -414,4 +423,8 @@ fn main() {
         Ok(()) => println!("\nwritten: {path}"),
         Err(error) => eprintln!("{path}: {error}"),
     }
+    // The README says 7 and 11; within a factor of three, as machines differ.
+    let [default, implicit] = report.least;
+    println!("rapier takes at least {default:.1} times as long by default, {implicit:.1} times implicitly");
+    assert!(default > 7.0 / 3.0 && implicit > 11.0 / 3.0, "{default} {implicit}");
 }

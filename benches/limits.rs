@@ -33,6 +33,7 @@ fn copy_speed(bytes: usize) -> f64 {
 
 /// What an element of each energy takes, on a hanging beam of 4000 tetrahedra, and smoothed.
 fn energies() {
+    let mut linear = f64::NAN;
     let all = Elasticity::ALL.iter().map(|energy| (*energy, false));
     for (elasticity, smoothed) in all.chain([(Elasticity::LinearCorotated, true)]) {
         let mut physics = PhysicsWorld::new();
@@ -50,7 +51,14 @@ fn energies() {
             elements.push(c.element_time.as_secs_f64() / c.elements as f64 * 1e9);
         }
         let name = if smoothed { "smoothed, per edge or node" } else { "" };
-        println!("{elasticity:?} {name}: {:.1} ns per element", median(elements));
+        let ns = median(elements);
+        println!("{elasticity:?} {name}: {ns:.1} ns per element");
+        if elasticity == Elasticity::LinearCorotated && !smoothed {
+            linear = ns;
+        } else if elasticity != Elasticity::Projective {
+            // 25, 27 and 37 over 24, within a factor of three.
+            assert!(ns < 3.0 * 1.5 * linear, "{elasticity:?} {name}: {ns} ns, linear corotated {linear} ns");
+        }
     }
 }
 

@@ -167,7 +167,8 @@ fn cable_without_compliance_does_not_stretch_under_a_thousand_times_the_weight_a
     let weight = world.bodies[block].mass() * G;
     let force = f64::from(world.bodies.attachment(cable).unwrap().force().y);
     println!("cable: farthest {farthest:.6} m of 0.5, force/weight {:.6}", force / weight);
-    assert!(farthest < 0.5 * 1.001 && (force / weight - 1.0).abs() < 1e-3);
+    // Farthest where its fall is caught, 4e-6 m beyond.
+    assert!(farthest < 0.5 * (1.0 + 1e-5) && (force / weight - 1.0).abs() < 1e-5, "{farthest} {force}");
     let bottom = at_rest_where(&world.bodies[block], |p| p[1] < -0.0999);
     world.bodies[block].add_force(&bottom, Vector::NEG_Y * (999.0 * weight) as f32).unwrap();
     for _ in 0..600 {
@@ -176,7 +177,10 @@ fn cable_without_compliance_does_not_stretch_under_a_thousand_times_the_weight_a
     }
     let force = f64::from(world.bodies.attachment(cable).unwrap().force().y);
     println!("loaded: farthest {farthest:.6} m, force/weight {:.3}", force / weight);
-    assert!(farthest < 0.5 * 1.001 && (force / weight / 1000.0 - 1.0).abs() < 1e-3);
+    assert!(
+        farthest < 0.5 * (1.0 + 1e-5) && (force / weight / 1000.0 - 1.0).abs() < 1e-5,
+        "{farthest} {force}"
+    );
 }
 
 #[test]

@@ -45,7 +45,7 @@ fn slender_cantilever_follows_the_converged_sequence_at_default_settings() {
         let tips = falling_tip(e, nu, SolverSettings::default(), 1.5);
         let error = tips.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         println!("E {e:e}, ν {nu}: largest tip error {error:.4} m of 1 m");
-        assert!(error < 0.03, "E {e:e} ν {nu}: {error}");
+        assert!(error < 0.01, "E {e:e} ν {nu}: {error}");
     }
 }
 
@@ -112,16 +112,11 @@ fn bars_bent_and_twisted_by_180_degrees_never_blow_up() {
                 error(0),
                 error(1)
             );
-            // Implicit Euler is dissipative but for the energy's nonconvexity: 2e-3, as at impacts.
-            assert!(highest < 1.002, "{what}: {highest}");
-            // Half a turn of bend springing back is fast: at the default knobs the shape is off by up to
-            // a tenth of its length against the converged steps, at ten iterations by less.
-            assert!(
-                settings != defaults || error(0).max(error(1)) < 0.06,
-                "{what}: {} {}",
-                error(0),
-                error(1)
-            );
+            // Implicit Euler is dissipative, and the first step already takes more than the energy's nonconvexity
+            // could give.
+            assert!(highest < 1.0, "{what}: {highest}");
+            // Half a turn springing back is fast: off by up to 4 % of the length against the converged steps.
+            assert!(error(0).max(error(1)) < 0.06, "{what}: {} {}", error(0), error(1));
         }
     }
 }

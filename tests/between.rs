@@ -44,7 +44,8 @@ fn interface_of_two_cubes_carries_the_weight_of_the_upper() {
             fastest(&world),
             deepest(&world)
         );
-        assert!(between.abs() < 1e-4 && below.abs() < 1e-4);
+        // Contacts are left alone within 1e-6 of their forces.
+        assert!(between.abs() < 1e-6 && below.abs() < 1e-6, "{between:e} {below:e}");
         assert!(fastest(&world) < 1e-5 && deepest(&world) > -1e-6);
     }
 }
@@ -71,7 +72,8 @@ fn colliding_bodies_keep_their_momentum() {
         off = (0..3).map(|k| (now[k] - start[k]).abs() / size).fold(off, f64::max);
     }
     println!("momentum off by {off:.1e}, touching in {touching} steps");
-    assert!(touching > 1 && off < 1e-9);
+    // f64 sums over some 300 nodes: a few roundings of 1e-16 each.
+    assert!(touching > 1 && off < 1e-14, "{off:e}");
 }
 
 /// Bodies of five shapes, four a layer, falling into a box.
@@ -120,9 +122,10 @@ fn pile_of_twenty_falls_asleep() {
         }
     }
     println!("asleep after {asleep_after:?} s, deepest at rest {resting:.1e} m, at the end {last:.1e} m");
-    assert!(asleep_after.is_some());
-    // A thousandth of the smallest extent, 0.12 m.
-    assert!(last > -1.2e-4 && resting > -1.2e-4);
+    // The last body lands after 1.3 s and rocks.
+    assert!(asleep_after.is_some_and(|t| t < 5.0), "{asleep_after:?}");
+    // A ten-thousandth of the smallest extent, 0.12 m.
+    assert!(last > -1e-5 && resting > -1e-5, "{last:e} {resting:e}");
     for (_, body) in world.bodies.iter() {
         let [x, y, z] = body.center_of_mass();
         assert!(x.abs() < 0.5 && z.abs() < 0.5 && y > 0.05, "fell out: {x} {y} {z}");

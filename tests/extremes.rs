@@ -26,7 +26,7 @@ struct Found {
     lowest: f64,
     lowest_box: f64,
     /// Steps that were given up.
-    is_rejected: usize,
+    rejected: usize,
 }
 
 /// A soft cube of 5 cm (as E = 1e3 wants) thrown on a fixed floor, with a rigid box on top of it that
@@ -66,7 +66,7 @@ fn throw(c: Corner) -> Found {
         finite: true,
         lowest: f64::INFINITY,
         lowest_box: f64::INFINITY,
-        is_rejected: 0,
+        rejected: 0,
     };
     let mut before = f64::INFINITY;
     for _ in 0..30 {
@@ -74,7 +74,7 @@ fn throw(c: Corner) -> Found {
         let now = energy(&world, &physics);
         found.growth = found.growth.max((now - before) / impact);
         found.excess = found.excess.max((now - start) / impact);
-        found.is_rejected += usize::from(world.bodies[soft].last_step_rejected());
+        found.rejected += usize::from(world.bodies[soft].last_step_rejected());
         found.finite &= now.is_finite() && world.bodies[soft].is_enabled();
         found.lowest = found.lowest.min(world.bodies[soft].center_of_mass()[1] / 0.05);
         found.lowest_box = found.lowest_box.min(f64::from(physics.bodies[load].translation().y) / 0.05);
@@ -108,7 +108,7 @@ fn no_corner_makes_energy_or_goes_through_the_floor() {
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for (c, f) in corners.iter().zip(&thrown) {
-        if f.growth > 2e-3 || f.excess > 1e-6 || f.lowest < 0.0 || f.is_rejected > 0 {
+        if f.growth > 2e-3 || f.excess > 1e-6 || f.lowest < 0.0 || f.rejected > 0 {
             println!(
                 "| {:.0e} | {} | {:.4} | {:.0e} | {} | {} | {:.1e} | {:.1e} | {:.3} | {:.3} | {} |",
                 c.e,
@@ -121,7 +121,7 @@ fn no_corner_makes_energy_or_goes_through_the_floor() {
                 f.excess,
                 f.lowest,
                 f.lowest_box,
-                f.is_rejected
+                f.rejected
             );
         }
     }
@@ -139,7 +139,7 @@ fn no_corner_makes_energy_or_goes_through_the_floor() {
         assert!(f.excess < 1e-6, "{c:?}: {f:?}");
         // What a body of this stiffness can carry, in steps of a game.
         let carries = c.e >= 1e6 && c.dt < 0.02 && c.speed == 0.0;
-        assert!(!carries || f.lowest > 0.0 && f.is_rejected == 0, "{c:?}: {f:?}");
-        assert!(c.iterations == 1 || f.growth < 2e-3, "{c:?}: {f:?}");
+        assert!(!carries || f.lowest > 0.0 && f.rejected == 0, "{c:?}: {f:?}");
+        assert!(f.growth < if c.iterations == 1 { 2e-2 } else { 2e-3 }, "{c:?}: {f:?}");
     }
 }

@@ -89,7 +89,9 @@ fn cube_thrown_on_its_corner_comes_to_rest_without_gaining_energy() {
                 assert!(t.enabled && t.speed < 1e-5, "{what}: {:e} m/s after 20 s", t.speed);
                 assert!(t.depth < 0.005 * 0.4, "{what}: {:e} m deep", t.depth);
                 assert!(t.excess <= 0.0, "{what}: {:e} above the start", t.excess);
-                assert!(t.growth < 2e-3, "{what}: grew by {:e}", t.growth);
+                // One iteration at 1e9 Pa once turned up to all of an impact into strain.
+                let growth = if e == 1e9 && iterations == 1 { 1e-8 } else { 5e-4 };
+                assert!(t.growth < growth, "{what}: grew by {:e}", t.growth);
             }
         }
     }

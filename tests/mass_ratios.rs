@@ -59,9 +59,11 @@ impl Arrangement {
         );
         assert!(self.world.bodies[self.soft].is_enabled(), "{what}");
         // Ten times its weight on a cube of 5 % strain is near buckling: it sways, slowly, for a while.
-        assert!(fastest < 3e-3, "{what}: {fastest:e} m/s");
-        assert!(deviation < 0.01 * weight, "{what}: {deviation} N of {weight} N");
-        assert!(deepest < 1e-4 * 0.4, "{what}: {deepest:e} m");
+        assert!(fastest < 5e-4, "{what}: {fastest:e} m/s");
+        // Contact forces are solved to 1e-8 and left alone within 1e-6: more is sway.
+        assert!(deviation < 1e-6 * weight, "{what}: {deviation} N of {weight} N");
+        // 1e-8 of the compression of 2 cm, a few times.
+        assert!(deepest < 1.5e-9, "{what}: {deepest:e} m");
     }
 }
 

@@ -43,9 +43,8 @@ fn box_of_any_mass_stands_on_a_cube() {
                 stands(ratio, nu, SolverSettings::iterations(iterations));
             }
             // At 1000:1 the default tolerance, 5e-3 of 600 kN, lets the box sway at some 1e-3 m/s.
-            if ratio < 1000.0 {
-                stands(ratio, nu, SolverSettings::default());
-            }
+            let ten = SolverSettings::iterations(10);
+            stands(ratio, nu, if ratio < 1000.0 { SolverSettings::default() } else { ten });
         }
     }
 }

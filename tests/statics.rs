@@ -43,8 +43,10 @@ fn cantilever_settles_at_the_static_solution_of_its_mesh() {
         let expected = static_tip(e);
         for dt in [1.0 / 30.0, 1.0 / 60.0, 1.0 / 240.0] {
             let tip = settled_tip(e, dt, CELLS);
-            println!("E {e:e}, dt {dt:.5}: tip {tip:.5} m, static {expected:.5} m");
-            assert!((tip / expected - 1.0).abs() < 0.004, "E {e:e}, dt {dt}: {tip} against {expected}");
+            let off = tip / expected - 1.0;
+            println!("E {e:e}, dt {dt:.5}: tip {tip:.5} m, static {expected:.5} m, off by {off:.1e}");
+            // Damped steps end where the forces do, far below their tolerance: the minimiser's 1e-8 is what is left.
+            assert!(off.abs() < 1e-5, "E {e:e}, dt {dt}: {tip} against {expected}");
         }
     }
 }

@@ -98,7 +98,8 @@ fn stiff_rope_does_not_stretch_under_a_thousand_times_its_weight() {
         println!(
             "{iterations} iterations: stretch {stretch:.3e}, E A says {expected:.3e}, longest ever {longest:.5} m"
         );
-        assert!(stretch < 1e-3 && (stretch / expected - 1.0).abs() < 0.02, "{stretch} {expected}");
+        // What linear elasticity leaves out is of the strain, 4e-4.
+        assert!((stretch / expected - 1.0).abs() < 1e-3, "{stretch} {expected}");
         assert!(longest < 1.01, "{longest}");
     }
 }
@@ -119,7 +120,8 @@ fn rods_and_sheets_bend_as_beams_do() {
     let drop = -positions(&world.bodies[body])[40][1];
     let expected = 1000.0 * area * G * f64::powi(free, 4) / (8.0 * e * inertia);
     println!("rod: {drop:.5} m, beam {expected:.5} m");
-    assert!((drop / expected - 1.0).abs() < 0.03, "{drop} {expected}");
+    // A drop of 2 % of the length shortens the lever by 4e-4; 40 segments err by about 1/40² more.
+    assert!((drop / expected - 1.0).abs() < 0.003, "{drop} {expected}");
     // A strip of Poisson's ratio 0 is a beam of I = b t³/12: but for the hinges' own ratio of −1/3 across,
     // which makes it softer by 8/9.
     let thickness = 4e-3;
@@ -137,8 +139,8 @@ fn rods_and_sheets_bend_as_beams_do() {
         let expected = 1000.0 * G * free.powi(4) / (8.0 * e * f64::from(thickness).powi(2) / 12.0);
         println!("strip {half_width} m wide, {cells:?}: {drop:.5} m, beam {expected:.5} m");
         // Somewhere between held flat across (1) and free to bend across (9/8).
-        let softest = if half_width == 0.025 { 1.3 } else { 1.13 };
-        assert!((0.99..softest).contains(&(drop / expected)), "{drop} {expected}");
+        let (stiffest, softest) = if half_width == 0.025 { (1.2, 1.3) } else { (1.05, 1.11) };
+        assert!((stiffest..softest).contains(&(drop / expected)), "{drop} {expected}");
     }
 }
 
@@ -170,7 +172,8 @@ fn hanging_cloth_has_the_shape_that_newtons_method_finds() {
     println!(
         "cloth hangs to {lowest:.4} m; worst vertex off by {defaults:.1e} m, at Engineering {engineering:.1e} m"
     );
-    assert!(lowest < -0.9 && defaults < 0.1 && engineering < 0.01, "{defaults} {engineering}");
+    // At Engineering to rounding: Newton's method too, to 1e-5 of the forces and quadratic.
+    assert!(lowest < -0.9 && defaults < 0.1 && engineering < 1e-9, "{defaults} {engineering}");
 }
 
 #[test]
@@ -221,8 +224,13 @@ fn sheet_pulled_along_its_length_has_youngs_modulus_and_poissons_ratio() {
     let strain = pull / (e * 0.2 * f64::from(thickness));
     let rim = |sign: f64| mean_position(body, &at_rest_where(body, |p| sign * p[2] > 0.0999))[2];
     let narrower = 1.0 - (rim(1.0) - rim(-1.0)) / 0.2;
-    println!("sheet: strain {longer:.5} of {strain:.5}, narrower by {narrower:.5} of {:.5}", nu * strain);
-    assert!((longer / strain - 1.0).abs() < 0.01 && (narrower / (nu * strain) - 1.0).abs() < 0.01);
+    let off = [longer / strain - 1.0, narrower / (nu * strain) - 1.0];
+    println!(
+        "sheet: strain {longer:.5}, off by {:.1e}, narrower by {narrower:.5}, off by {:.1e}",
+        off[0], off[1]
+    );
+    // Uniform strain, linear in the stretch: a residual of 1e-6 of the forces is left.
+    assert!(off.iter().all(|o| o.abs() < 1e-3), "{off:?}");
 }
 
 fn floor_force(world: &DeformableWorld, floor: ColliderHandle) -> f64 {
