@@ -97,3 +97,72 @@ fn round_topped_shapes_carry_a_cube() {
         assert!((force - 1.0).abs() < 1e-2, "{name}: {force}");
     }
 }
+
+/// A cube of one cell, whose lower face is two triangles of 0.2 m, set down on a shape smaller than those, whose top is
+/// y = 0. What it is held by is nothing but the shape: no node of the cube is over it.
+fn on_small(colliders: Vec<ColliderBuilder>) -> (f64, f64) {
+    let mut physics = PhysicsWorld::new();
+    let colliders: Vec<ColliderHandle> =
+        colliders.into_iter().map(|c| physics.insert(RigidBodyBuilder::fixed(), c.friction(1.0)).1).collect();
+    let mut world = DeformableWorld::new();
+    let body = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [1, 1, 1])
+        .can_sleep(false)
+        .translation(Vector::Y * 0.11)
+        .material(DeformableMaterial::new(1e6, 0.3).friction(1.0).mass_damping(20.0));
+    let body = world.insert(body).unwrap();
+    for _ in 0..120 {
+        world.step(&mut physics);
+    }
+    let b = &world.bodies[body];
+    let force: f64 = colliders.iter().map(|c| f64::from(world.contact_force(body, *c).y)).sum();
+    (b.center_of_mass()[1], force / (b.mass() * G))
+}
+
+#[test]
+fn a_soft_face_that_spans_a_small_shape_rests_on_it() {
+    let corners = [(-0.04, -0.03), (0.04, -0.03), (0.0, 0.05)].map(|(x, z)| Vector::new(x, 0.0, z));
+    let [a, b, c] = corners;
+    let up = |y: f32| corners.map(|p| p + Vector::Y * y);
+    let round = up(-0.01);
+    let voxel = Vector::splat(0.08);
+    let shapes = [
+        ("cuboid", vec![ColliderBuilder::cuboid(0.04, 0.04, 0.04).translation(Vector::Y * -0.04)]),
+        (
+            "voxel",
+            vec![
+                ColliderBuilder::voxels(voxel, &[IVector::ZERO])
+                    .translation(Vector::splat(-0.04) - Vector::Y * 0.04),
+            ],
+        ),
+        ("triangle", vec![ColliderBuilder::triangle(a, b, c)]),
+        ("round triangle", vec![ColliderBuilder::round_triangle(round[0], round[1], round[2], 0.01)]),
+        (
+            "segments",
+            vec![
+                ColliderBuilder::segment(Vector::new(-0.05, 0.0, -0.04), Vector::new(0.05, 0.0, -0.04)),
+                ColliderBuilder::segment(Vector::new(-0.05, 0.0, 0.04), Vector::new(0.05, 0.0, 0.04)),
+            ],
+        ),
+        ("polyline", vec![ColliderBuilder::polyline(vec![a, b, c], Some(vec![[0, 1], [1, 2], [2, 0]]))]),
+    ];
+    for (name, shape) in shapes {
+        let (height, force) = on_small(shape);
+        println!("{name}: height {height:.5}, force {force:.5}");
+        // The weight of 8 kg on a stiff cube: it gives way by a millimetre at the corners.
+        assert!((0.095..0.102).contains(&height), "{name}: {height}");
+        assert!((force - 1.0).abs() < 1e-2, "{name}: {force}");
+    }
+}
+
+#[test]
+fn a_floor_of_voxels_carries_a_cube() {
+    let floor: Vec<IVector> =
+        (0..20).flat_map(|x| (0..3).flat_map(move |y| (0..20).map(move |z| IVector::new(x, y, z)))).collect();
+    let size = 0.05;
+    let shape = ColliderBuilder::voxels(Vector::splat(size), &floor);
+    let (height, force, speed) = settle(shape.translation(Vector::new(-0.5, -3.0 * size, -0.5)));
+    println!("voxels: height {height:.6}, force {force:.8}, speed {speed:.1e}");
+    // As other flat tops.
+    assert!((0.096..0.1001).contains(&height), "{height}");
+    assert!((force - 1.0).abs() < 1e-3 && speed < 1e-3, "{force} {speed:e}");
+}

@@ -3,8 +3,11 @@
 //! Architecture invariant: the only room that names parry's queries, and it knows no rapier sets:
 //! `coupling` fills the [`Obstacle`]s.
 
-mod constraint;
+mod shape_table;
+
 mod obstacle;
+
+mod constraint;
 
 mod candidates;
 mod surface_point;
@@ -13,7 +16,11 @@ mod rim_contact;
 mod thin_contact;
 mod triangle_contact;
 
+mod pair_scene;
+
 mod detection;
+
+mod closest_points;
 
 mod surface_tree;
 
@@ -31,8 +38,9 @@ mod queries;
 
 pub(crate) use candidates::Candidates;
 pub(crate) use constraint::{Constraint, Endpoint, Law};
-pub(crate) use detection::{Detector, Pair, STATIC_MARGIN};
+pub(crate) use detection::{Detector, STATIC_MARGIN};
 pub(crate) use obstacle::{Obstacle, ProxyId};
+pub(crate) use pair_scene::Pair;
 pub use queries::DeformableSurfacePoint;
 pub(crate) use soft_contact::SoftDetector;
 pub(crate) use soft_surface::{SoftPair, SoftSurface};

@@ -1,8 +1,9 @@
 //! Rigid geometry as contact sees it.
 
+use super::shape_table::{ShapeTraits, Solidity, shape_traits};
 use crate::math::{Pose64, Vec3};
 use parry3d::bounding_volume::Aabb;
-use parry3d::shape::{SharedShape, TypedShape};
+use parry3d::shape::SharedShape;
 
 /// Names a rigid body (or a collider without one) within a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -19,15 +20,6 @@ pub(crate) struct Obstacle {
     pub shape: SharedShape,
     pub start: Pose64,
     pub end: Pose64,
-}
-
-/// How "inside" is to be read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Solidity {
-    /// The shape has an inside that projections know.
-    Solid,
-    /// A sheet: the side is the one the body comes from.
-    Sheet,
 }
 
 impl Obstacle {
@@ -60,25 +52,12 @@ impl Obstacle {
         Aabb::from_points(corners)
     }
 
+    /// What contact has to know of its shape.
+    pub fn traits(&self) -> ShapeTraits<'_> {
+        shape_traits(&self.shape)
+    }
+
     pub fn solidity(&self) -> Solidity {
-        match self.shape.as_typed_shape() {
-            TypedShape::TriMesh(mesh) if mesh.pseudo_normals_if_oriented().is_none() => Solidity::Sheet,
-            TypedShape::HeightField(_)
-            | TypedShape::Triangle(_)
-            | TypedShape::Segment(_)
-            | TypedShape::Polyline(_) => Solidity::Sheet,
-            _ => Solidity::Solid,
-        }
-    }
-
-    /// Made of plane faces: nodes, rims and corners carry what lies on it.
-    pub fn is_faceted(&self) -> bool {
-        use TypedShape::{ConvexPolyhedron, Cuboid, TriMesh, Voxels};
-        matches!(self.shape.as_typed_shape(), Cuboid(_) | ConvexPolyhedron(_) | TriMesh(_) | Voxels(_))
-    }
-
-    /// A plane without edges: its contacts with a body are all at nodes.
-    pub fn is_half_space(&self) -> bool {
-        self.shape.as_halfspace().is_some()
+        self.traits().solidity
     }
 }

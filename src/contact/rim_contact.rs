@@ -1,17 +1,17 @@
-//! Rows where the rim of an obstacle's face crosses an edge of the body, and where a corner of the
+//! Contacts where the rim of an obstacle's face crosses an edge of the body, and where a corner of the
 //! obstacle stands on a triangle of the body.
 //!
 //! A flat face on a flat surface touches everywhere at once; what carries it are the corners of the
 //! overlap: nodes under the face, body edges under its rim, and its own corners. They are found
 //! as such, one by one, so that they are the same ones in every step.
 
-use super::obstacle::{Obstacle, Solidity};
+use super::obstacle::Obstacle;
+use super::shape_table::{Corners, Solidity};
 use super::surface_point::{Scales, SurfacePoint, is_over_face, surface_point};
 use super::triangle_contact::barycentric;
 use crate::math::{Vec3, from_real, to_real};
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::Vector;
-use parry3d::shape::{Shape, TypedShape};
 
 /// Cosine beyond which a face looks at the body's surface.
 const FACING: f64 = -0.1;
@@ -93,15 +93,17 @@ pub(crate) fn corners_in(obstacle: &Obstacle, region: &Aabb, found: &mut Vec<(u3
             found.push((number, from_real(corner)));
         }
     };
-    match obstacle.shape.as_typed_shape() {
-        TypedShape::Cuboid(cuboid) => {
-            let corners = cuboid.compute_local_aabb().vertices();
+    match obstacle.traits().corners {
+        Corners::None => {}
+        Corners::Box(half) => {
+            let corners = Aabb::from_half_extents(Vector::ZERO, half).vertices();
             corners.iter().zip(0..).for_each(|(&corner, number)| take(number, corner));
         }
-        TypedShape::ConvexPolyhedron(hull) => {
-            hull.points().iter().zip(0..).for_each(|(&corner, number)| take(number, corner));
+        Corners::Points(points) => {
+            points.iter().zip(0..).for_each(|(&corner, number)| take(number, corner));
         }
-        TypedShape::TriMesh(mesh) => {
+        Corners::Ends(ends) => ends.iter().zip(0..).for_each(|(&end, number)| take(number, end)),
+        Corners::Mesh(mesh) => {
             for triangle in mesh.bvh().intersect_aabb(region) {
                 for number in mesh.indices()[triangle as usize] {
                     take(number, mesh.vertices()[number as usize]);
@@ -110,7 +112,6 @@ pub(crate) fn corners_in(obstacle: &Obstacle, region: &Aabb, found: &mut Vec<(u3
             found.sort_unstable_by_key(|(number, _)| *number);
             found.dedup_by_key(|(number, _)| *number);
         }
-        _ => {}
     }
 }
 

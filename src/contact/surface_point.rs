@@ -6,9 +6,10 @@
 //! of the node shifted back into its body, where "outside" is unambiguous. parry answers in `f32`;
 //! the gap is taken along the normal with the node's `f64` position.
 
-use super::obstacle::{Obstacle, Solidity};
+use super::obstacle::Obstacle;
+use super::shape_table::{ShapeTraits, Solidity};
 use crate::math::{Vec3, from_real, to_real};
-use parry3d::shape::{FeatureId, Shape, SharedShape, TypedShape};
+use parry3d::shape::FeatureId;
 
 /// In the obstacle's frame.
 #[derive(Clone, Copy, Debug)]
@@ -122,7 +123,7 @@ struct Projection {
 }
 
 fn project(obstacle: &Obstacle, p: &Vec3) -> Option<Projection> {
-    let (core, radius) = core_and_radius(&obstacle.shape);
+    let ShapeTraits { core, radius, .. } = obstacle.traits();
     let (projection, feature) = core.project_local_point_and_get_feature(to_real(p));
     let point = from_real(projection.point);
     if !point.iter().all(|c| c.is_finite()) {
@@ -155,20 +156,6 @@ fn project(obstacle: &Obstacle, p: &Vec3) -> Option<Projection> {
         direction: (depth != 0.0).then(|| if depth > 0.0 { -outward } else { outward }),
         face: face.filter(|n| n.dot(&outward) > 0.999),
     })
-}
-
-/// Round shapes as a core and the thickness around it: projections onto the core are exact where
-/// those onto the round shape iterate.
-fn core_and_radius(shape: &SharedShape) -> (&dyn Shape, f64) {
-    match shape.as_typed_shape() {
-        TypedShape::Capsule(s) => (&s.segment, s.radius.into()),
-        TypedShape::RoundCuboid(s) => (&s.inner_shape, s.border_radius.into()),
-        TypedShape::RoundTriangle(s) => (&s.inner_shape, s.border_radius.into()),
-        TypedShape::RoundCylinder(s) => (&s.inner_shape, s.border_radius.into()),
-        TypedShape::RoundCone(s) => (&s.inner_shape, s.border_radius.into()),
-        TypedShape::RoundConvexPolyhedron(s) => (&s.inner_shape, s.border_radius.into()),
-        _ => (&*shape.0, 0.0),
-    }
 }
 
 /// The exact normal of the face if that is what the direction means, up to sign.

@@ -1,7 +1,8 @@
 //! Sides of what has no inside: sheets and rods. Which way is out is decided against each obstacle: away from
 //! the body, towards what it may touch.
 
-use super::obstacle::{Obstacle, Solidity};
+use super::obstacle::Obstacle;
+use super::shape_table::Solidity;
 use super::surface_point::{Scales, SurfacePoint, towards_surface};
 use crate::body::{ConstraintKey, ConstraintMemory, Feature};
 use crate::math::{Vec3, from_real, to_real};

@@ -9,6 +9,8 @@ mod coefficients;
 mod mass_properties;
 
 mod articulations;
+mod shape_meshes;
+
 mod scene;
 
 mod joint_constraints;

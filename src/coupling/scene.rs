@@ -3,6 +3,7 @@
 use super::articulations::{ArticulatedLinks, ReadArticulation, read_articulation};
 use super::mass_properties::proxy_of;
 use super::parts::{RapierSets, StepContext, packed};
+use super::shape_meshes::ShapeMeshes;
 use crate::contact::{Obstacle, ProxyId};
 use crate::math::{Mat3, Pose64, Vec3, rotation_from_vector};
 use crate::solver::{Articulation, RigidProxies, RigidProxy, Twist};
@@ -11,7 +12,6 @@ use rapier3d::dynamics::{MultibodyIndex, RigidBody, RigidBodyHandle};
 use rapier3d::geometry::ColliderHandle;
 use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::Arc;
 
 /// The rigid world of one step.
 #[derive(Default)]
@@ -24,11 +24,7 @@ pub(crate) struct RapierScene {
     pub colliders: Vec<ColliderHandle>,
     pub(super) articulated: Vec<ArticulatedLinks>,
     proxy_of_body: HashMap<RigidBodyHandle, ProxyId>,
-    /// Heightfields as triangle meshes, which project points faster. The field is kept too, so
-    /// that its address stays its own.
-    meshes: HashMap<usize, (SharedShape, SharedShape)>,
-    /// Heightfields that this step has seen.
-    seen: Vec<usize>,
+    meshes: ShapeMeshes,
 }
 
 impl RapierScene {
@@ -40,7 +36,7 @@ impl RapierScene {
         self.colliders.clear();
         self.articulated.clear();
         self.proxy_of_body.clear();
-        self.seen.clear();
+        self.meshes.begin();
         for (handle, collider) in context.sets.colliders.iter() {
             if !collider.is_enabled() || collider.is_sensor() {
                 continue;
@@ -66,8 +62,7 @@ impl RapierScene {
             };
             self.push_shape(handle, proxy, collider.shared_shape().clone(), start, end);
         }
-        let seen = &self.seen;
-        self.meshes.retain(|address, _| seen.contains(address));
+        self.meshes.finish();
     }
 
     /// The obstacles of a collider: ascending by slot, as rapier goes through its set.
@@ -171,17 +166,7 @@ impl RapierScene {
                     push(shape.clone(), part as u32, start.compose(&offset), end.compose(&offset));
                 }
             }
-            TypedShape::HeightField(field) => {
-                let address = Arc::as_ptr(&shape.0).cast::<()>() as usize;
-                self.seen.push(address);
-                let (_, mesh) = self.meshes.entry(address).or_insert_with(|| {
-                    let (vertices, triangles) = field.to_trimesh();
-                    let mesh = SharedShape::trimesh(vertices, triangles);
-                    (shape.clone(), mesh.unwrap_or_else(|_| shape.clone()))
-                });
-                push(mesh.clone(), 0, start, end);
-            }
-            _ => push(shape, 0, start, end),
+            _ => push(self.meshes.mesh_of(shape), 0, start, end),
         }
     }
 }

@@ -14,8 +14,8 @@ use super::rigid_mode::RigidMode;
 use crate::fem::{DeformableModel, SystemMatrix, node_rotations};
 use crate::math::lanes::Lane;
 use crate::math::{Mat3, Vec3, rounded_rotation};
+use crate::profiler::Stopwatch;
 use crate::solver::counters::SolveCounters;
-use std::time::Instant;
 
 /// Binary places of the frames' quaternions.
 const FRAME_BITS: i32 = 20;
@@ -206,7 +206,7 @@ impl Preconditioner {
 
     /// `out = Q A⁻¹ Qᵀ r`.
     fn rotate_and_solve(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
-        let start = Instant::now();
+        let mut clock = Stopwatch::start();
         let Self { rhs, scratch, .. } = self;
         match (factor.system, self.kind) {
             (SystemMatrix::Laplacian, _) => {
@@ -223,7 +223,7 @@ impl Preconditioner {
         }
         self.counters.solves += 1;
         self.counters.solve_bytes += 2 * factor.factor.bytes();
-        self.counters.linear_time += start.elapsed();
+        self.counters.linear_time += clock.lap();
     }
 
     /// The frame of a node.

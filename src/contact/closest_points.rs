@@ -1,0 +1,132 @@
+//! Contacts at closest points: inside triangles and segments of the body, where nodes, rims and corners miss.
+
+use super::constraint::Constraint;
+use super::detection::Detector;
+use super::pair_scene::PairScene;
+use super::surface_point::{SurfacePoint, surface_point};
+use super::thin_contact::segment_point;
+use super::triangle_contact::triangle_point;
+use crate::body::{ConstraintKey, ConstraintMemory, Feature};
+use crate::math::{Vec3, to_real};
+use crate::mesh::NONE;
+use parry3d::bounding_volume::{Aabb, BoundingVolume};
+
+/// Slot of the first closest point on a feature; those before are nodes, rims and corners.
+const FIRST_POINT: u32 = 1;
+
+impl Detector {
+    /// Closest points that carried in the last step are looked at again where they were. One closest
+    /// point per triangle is not enough where a surface wraps around another: pushed in at one
+    /// point, the next one is elsewhere, and without memory the two would take turns for ever. Rows with
+    /// shapes of plane faces have no slots, and so none is kept: beside an edge the normal of a face is not
+    /// the one of the contact.
+    pub(super) fn keep_points(
+        &mut self,
+        scene: &PairScene<'_>,
+        memory: &[ConstraintMemory],
+        constraints: &mut Vec<Constraint>,
+    ) {
+        let surface = &scene.model.surface;
+        self.points.clear();
+        let carried = memory.iter().filter(|m| m.force != Vec3::zeros());
+        for kept in carried {
+            let ConstraintKey::Obstacle(contact) = kept.key else { continue };
+            if contact.slot < FIRST_POINT {
+                continue;
+            }
+            let (nodes, weights) = (kept.geometry.nodes[0], kept.geometry.weights[0]);
+            let s = nodes.map(|n| surface.index_of_node[n as usize] as usize);
+            // A restored state may be another mesh's.
+            if s.iter().any(|s| *s >= self.local.len()) {
+                continue;
+            }
+            let [a, b, c] = s.map(|s| self.local[s]);
+            let p = a * weights[0] + b * weights[1] + c * weights[2];
+            let mut outward = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
+            if outward == Vec3::zeros() || s.iter().any(|&s| surface.is_thin[s]) {
+                outward = -scene.obstacle.start.rotation.tr_mul(&kept.geometry.frame[0]);
+            }
+            let reach = s.iter().fold(0.0, |a: f64, &s| a.max(self.reach[s])) + scene.motion;
+            let found = surface_point(scene.obstacle, &p, &outward, &scene.scales);
+            if let Some(found) = found.filter(|f| f.gap < reach && f.normal.dot(&outward) < 0.0) {
+                self.points.push((contact.feature, contact.slot, found));
+                constraints.push(scene.constraint(nodes, weights, &found, (contact.feature, contact.slot)));
+            }
+        }
+    }
+
+    pub(super) fn detect_triangles(&mut self, scene: &PairScene<'_>, constraints: &mut Vec<Constraint>) {
+        let surface = &scene.model.surface;
+        for (t, triangle) in surface.triangles.iter().enumerate() {
+            let s = triangle.map(|n| surface.index_of_node[n as usize] as usize);
+            let corners = s.map(|s| self.local[s]);
+            let reach = s.iter().fold(0.0, |a: f64, &s| a.max(self.reach[s])) + scene.motion;
+            let around = Aabb::from_points(corners.iter().map(to_real)).loosened(reach as f32);
+            if !around.intersects(&scene.extent) || self.lies_under_one_face(&s) {
+                continue;
+            }
+            let edges = surface.triangle_edges[t].map(|e| &self.edges[e as usize]);
+            let standing = self.standing.iter().filter(|(on, _)| *on == t).map(|(_, constraint)| constraint);
+            let known = s.iter().filter_map(|&s| self.nodes[s].as_ref());
+            let [e0, e1, e2] = surface.triangle_edges[t].map(Feature::Edge);
+            let own = [e0, e1, e2, Feature::Triangle(t as u32)];
+            let points = self.points.iter().filter(|(feature, ..)| own.contains(feature)).map(|p| &p.2);
+            let known = known.chain(edges.into_iter().flatten()).chain(standing).chain(points);
+            let turned = t >= surface.closed && self.looks_away(scene, triangle, &corners);
+            let corners = if turned { [corners[0], corners[2], corners[1]] } else { corners };
+            if let Some(mut hit) = triangle_point(scene.obstacle, &corners, known, reach, &scene.scales) {
+                if turned {
+                    hit.weights.swap(1, 2);
+                }
+                let feature = match hit.weights.iter().position(|w| *w == 0.0) {
+                    Some(opposite) => Feature::Edge(surface.triangle_edges[t][opposite]),
+                    None => Feature::Triangle(t as u32),
+                };
+                let slot = self.free_slot(feature);
+                self.points.push((feature, slot, hit.surface));
+                constraints.push(scene.constraint(*triangle, hit.weights, &hit.surface, (feature, slot)));
+            }
+        }
+    }
+
+    /// Contacts inside the segments of rods.
+    pub(super) fn detect_segments(&mut self, scene: &PairScene<'_>, constraints: &mut Vec<Constraint>) {
+        let surface = &scene.model.surface;
+        let alone = surface.edge_triangles.iter().enumerate().filter(|(_, endpoints)| endpoints[0] == NONE);
+        for (e, _) in alone {
+            let s = surface.edges[e].map(|n| surface.index_of_node[n as usize] as usize);
+            let ends = s.map(|s| self.local[s]);
+            let reach = self.reach[s[0]].max(self.reach[s[1]]) + scene.motion;
+            let around = Aabb::from_points(ends.iter().map(to_real)).loosened(reach as f32);
+            if !around.intersects(&scene.extent) {
+                continue;
+            }
+            let feature = Feature::Edge(e as u32);
+            let skin =
+                surface.edges[e].iter().map(|&n| scene.model.half_thickness[n as usize]).fold(0.0, f64::max);
+            let points = self.points.iter().filter(|p| p.0 == feature).map(|p| &p.2);
+            let known = s.iter().filter_map(|&s| self.nodes[s].as_ref()).chain(&self.edges[e]).chain(points);
+            if let Some((t, found)) = segment_point(scene.obstacle, &ends, known, reach, skin, &scene.scales)
+            {
+                let [a, b] = surface.edges[e];
+                let name = (feature, self.free_slot(feature));
+                constraints.push(scene.constraint([a, b, a], [1.0 - t, t, 0.0], &found, name));
+            }
+        }
+    }
+
+    /// The first slot of a feature that no closest point has yet.
+    fn free_slot(&self, feature: Feature) -> u32 {
+        let taken = |slot: u32| self.points.iter().any(|p| (p.0, p.1) == (feature, slot));
+        (FIRST_POINT..).find(|&slot| !taken(slot)).unwrap_or(FIRST_POINT)
+    }
+
+    /// Whether a triangle's corners all touch the same plane face: there is nothing to add then.
+    fn lies_under_one_face(&self, s: &[usize; 3]) -> bool {
+        let [Some(a), Some(b), Some(c)] = s.map(|s| self.nodes[s]) else {
+            return false;
+        };
+        let same = |o: &SurfacePoint| o.flat && o.normal == a.normal;
+        a.flat && same(&b) && same(&c)
+    }
+}
