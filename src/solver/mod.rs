@@ -12,6 +12,8 @@ mod clusters;
 mod columns;
 mod cone_hessian;
 mod cone_newton;
+#[cfg(test)]
+mod cone_tests;
 mod contact_groups;
 mod contact_system;
 mod delassus;
