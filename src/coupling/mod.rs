@@ -10,6 +10,8 @@ mod joint_rows;
 mod obstacles;
 mod parts;
 mod reactions;
+#[cfg(test)]
+mod tests;
 mod ties;
 
 pub(crate) use closure::{Around, Closure, ClosureSource};
