@@ -52,7 +52,8 @@ impl DeformableBody {
         let undamped = elastic_forces::StiffnessDamping::default();
         let frame = crate::math::Mat3::identity();
         let x = &self.state.x;
-        elastic_forces::add_forces(&self.elements(), &undamped, x, &frame, f64::INFINITY, &mut unused).energy
+        let at = elastic_forces::Evaluation { damping: &undamped, x, frame: &frame, limit: f64::INFINITY };
+        elastic_forces::add_forces(&self.elements(), &at, &mut unused).energy
     }
 
     /// Sets the velocity of all vertices [m/s].

@@ -5,7 +5,7 @@ use crate::math::Vec3;
 
 /// What two edges that cross may miss.
 #[derive(Clone, Copy)]
-pub(super) struct Room {
+pub(super) struct EdgeTolerance {
     /// Part of an edge beyond its ends.
     beside: f64,
     /// Angle \[rad\] between the direction across them and the normals at them.
@@ -15,9 +15,10 @@ pub(super) struct Room {
 }
 
 /// Of edges that did not carry: within a thousandth of an end the node's own constraint serves.
-pub(super) const NEW_EDGES: Room = Room { beside: -1.0e-3, askew: 0.4, crossing: 0.1 };
+pub(super) const NEW_EDGES: EdgeTolerance = EdgeTolerance { beside: -1.0e-3, askew: 0.4, crossing: 0.1 };
 /// Of edges that carried in the last step.
-pub(super) const CARRYING_EDGES: Room = Room { beside: STILL_BESIDE, askew: 0.6, crossing: 0.05 };
+pub(super) const CARRYING_EDGES: EdgeTolerance =
+    EdgeTolerance { beside: STILL_BESIDE, askew: 0.6, crossing: 0.05 };
 
 /// Two edges across one another.
 pub(super) struct Crossing {
@@ -36,7 +37,7 @@ pub(super) fn crossing(
     ea: usize,
     b: &SoftSurface<'_>,
     eb: usize,
-    room: Room,
+    tolerance: EdgeTolerance,
     last: Option<Vec3>,
 ) -> Option<Crossing> {
     let ends = |s: &SoftSurface<'_>, e: usize| s.model.surface.edges[e].map(|n| n as usize);
@@ -45,13 +46,10 @@ pub(super) fn crossing(
     let (q, v) = (b.x[k], b.x[l] - b.x[k]);
     let across = u.cross(&v);
     let length = across.norm();
-    if !(length > room.crossing * u.norm() * v.norm()) {
+    if !(length > tolerance.crossing * u.norm() * v.norm()) {
         return None;
     }
     let normal = across / length;
-    let reach_of = |s: &SoftSurface<'_>, ends: [usize; 2]| {
-        ends.map(|n| s.reach[s.model.surface.index_of_node[n] as usize]).into_iter().fold(0.0, f64::max)
-    };
     let reach = reach_of(a, [i, j]) + reach_of(b, [k, l]);
     let deepest = DEEPEST * a.model.surface.mean_edge.min(b.model.surface.mean_edge);
     let height = normal.dot(&(p - q));
@@ -72,29 +70,36 @@ pub(super) fn crossing(
     let (normal, height) = (normal * sign, height * sign);
     let within = height < reach && height > -deepest;
     if !within
-        || !(thin[0] || looks_along(a, ea, &outward_a, &-normal, room.askew))
-        || !(thin[1] || looks_along(b, eb, &outward_b, &normal, room.askew))
+        || !(thin[0] || looks_along(a, ea, &outward_a, &-normal, tolerance.askew))
+        || !(thin[1] || looks_along(b, eb, &outward_b, &normal, tolerance.askew))
     {
         return None;
     }
-    let move_of = |s: &SoftSurface<'_>, ends: [usize; 2]| {
-        (s.target[ends[0]] - s.x[ends[0]] + s.target[ends[1]] - s.x[ends[1]]) * 0.5
-    };
-    let way = move_of(a, [i, j]) - move_of(b, [k, l]);
-    let closing = -normal.dot(&way);
-    let closing = Closing::new(height, closing);
-    let when = closing.when;
+    let way = mean_motion(a, [i, j]) - mean_motion(b, [k, l]);
+    let closing = Closing::new(height, -normal.dot(&way));
     // In the plane of both: p + s u = q + t v.
-    let w = q - p - way * when;
+    let w = q - p - way * closing.when;
     let squared = length * length;
     let s = w.cross(&v).dot(&across) / squared;
     let t = w.cross(&u).dot(&across) / squared;
-    let inside = |t: f64| t > -room.beside && t < 1.0 + room.beside;
-    let skin = |s: &SoftSurface<'_>, [i, j]: [usize; 2], t: f64| {
-        s.model.half_thickness[i] * (1.0 - t) + s.model.half_thickness[j] * t
-    };
+    let inside = |t: f64| t > -tolerance.beside && t < 1.0 + tolerance.beside;
     let gap = height - skin(a, [i, j], s) - skin(b, [k, l], t);
     (inside(s) && inside(t)).then_some(Crossing { places: [s, t], normal, gap, closing })
+}
+
+/// How far the farther of two nodes may come \[m\].
+fn reach_of(s: &SoftSurface<'_>, ends: [usize; 2]) -> f64 {
+    ends.map(|n| s.reach[s.model.surface.index_of_node[n] as usize]).into_iter().fold(0.0, f64::max)
+}
+
+/// Mean motion of two nodes over the step without contact \[m\].
+fn mean_motion(s: &SoftSurface<'_>, ends: [usize; 2]) -> Vec3 {
+    (s.target[ends[0]] - s.x[ends[0]] + s.target[ends[1]] - s.x[ends[1]]) * 0.5
+}
+
+/// Half thickness at a place between two nodes \[m\].
+fn skin(s: &SoftSurface<'_>, [i, j]: [usize; 2], t: f64) -> f64 {
+    s.model.half_thickness[i] * (1.0 - t) + s.model.half_thickness[j] * t
 }
 
 /// Whether a direction across an edge is between the normals of its two triangles, or nearly; of an edge that

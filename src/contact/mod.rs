@@ -27,6 +27,7 @@ mod surface_tree;
 mod soft_surface;
 
 mod edge_contact;
+mod node_contact;
 mod tangle;
 
 mod soft_contact;

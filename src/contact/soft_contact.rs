@@ -10,14 +10,12 @@
 
 use super::constraint::{Constraint, Endpoint};
 use super::edge_contact::{CARRYING_EDGES, NEW_EDGES, crossing};
-use super::soft_surface::{Closing, DEEPEST, STILL_BESIDE, SoftPair, SoftSurface, near_in_mesh};
+use super::node_contact::{Touch, on_triangle};
+use super::soft_surface::{Closing, STILL_BESIDE, SoftPair, SoftSurface, near_in_mesh};
 use super::tangle::{untangle, untangle_itself};
-use super::triangle_contact::barycentric;
 use crate::body::{ConstraintKey, ConstraintMemory, SoftPairContact, SoftPairKind};
 use crate::math::Vec3;
 
-/// Cosine beyond which two surfaces face one another.
-const FACING: f64 = -0.1;
 /// By how much weights may miss a triangle at first; [`STILL_BESIDE`] where contact was.
 const BESIDE: f64 = 0.02;
 /// Cosine beyond which two triangles of one surface are one face.
@@ -42,19 +40,6 @@ pub(crate) struct SoftDetector {
     closings: Vec<Closing>,
     /// Per surface node: the normal of its constraint, towards its own body.
     held: [Vec<Option<Vec3>>; 2],
-}
-
-/// A node on a triangle.
-#[derive(Clone, Copy)]
-struct Touch {
-    triangle: usize,
-    weights: [f64; 3],
-    /// Outward of the triangle.
-    normal: Vec3,
-    gap: f64,
-    /// By how much the weights miss the triangle.
-    miss: f64,
-    closing: Closing,
 }
 
 impl SoftDetector {
@@ -161,7 +146,6 @@ impl SoftDetector {
         constraints: &mut Vec<Constraint>,
     ) {
         let (own, other) = (surfaces[side], surfaces[1 - side]);
-        let itself = own.key == other.key;
         let list = std::mem::take(&mut self.on_triangles[side]);
         let mut touches = std::mem::take(&mut self.touches);
         for near in list.chunk_by(|a, b| a.0 == b.0) {
@@ -172,38 +156,11 @@ impl SoftDetector {
             let key = |t: u32| {
                 ConstraintKey::SoftPair(SoftPairContact { other: other_key, second: t, first: node, kind })
             };
-            touches.clear();
-            // The nearest fresh one, and those of the last step.
-            let mut best: Option<Touch> = None;
-            for &(_, t) in near {
-                if itself && are_neighbours(own, s, t as usize) {
-                    continue;
-                }
-                let last = self.last_normal(&key(t)).map(|normal| if side == 0 { normal } else { -normal });
-                let carried = last.is_some();
-                let room = if carried { STILL_BESIDE } else { BESIDE };
-                let touch = on_triangle(own, s, other, t as usize, room, last);
-                let Some(touch) =
-                    touch.filter(|touch| carried || itself || !self.is_held(touch, other, 1 - side))
-                else {
-                    continue;
-                };
-                if carried {
-                    touches.push(touch);
-                }
-                if touch.miss <= BESIDE && best.is_none_or(|b| touch.gap.abs() < b.gap.abs()) {
-                    best = Some(touch);
-                }
-            }
-            if let Some(best) = best {
-                touches.retain(|t| t.triangle != best.triangle && t.normal.dot(&best.normal) < COPLANAR);
-                touches.push(best);
-            }
+            self.touches_of_node(surfaces, side, near, &key, &mut touches);
             let Some(last) = touches.last() else { continue };
             self.held[side][s] = Some(last.normal);
             for touch in &touches {
-                let own_endpoint =
-                    Endpoint::Soft { body: own.body, nodes: [node, 0, 0], weights: [1.0, 0.0, 0.0] };
+                let own_endpoint = Endpoint::node(own.body, node);
                 let nodes = other.model.surface.triangles[touch.triangle];
                 let other_endpoint = Endpoint::Soft { body: other.body, nodes, weights: touch.weights };
                 let (endpoints, normal) = match side {
@@ -216,6 +173,44 @@ impl SoftDetector {
         }
         self.touches = touches;
         self.on_triangles[side] = list;
+    }
+
+    /// The triangles that a node touches: those of the last step that still serve, and the nearest fresh one. `near` are
+    /// the node and the triangles near it.
+    fn touches_of_node(
+        &self,
+        surfaces: [&SoftSurface<'_>; 2],
+        side: usize,
+        near: &[(u32, u32)],
+        key: &impl Fn(u32) -> ConstraintKey,
+        touches: &mut Vec<Touch>,
+    ) {
+        let (own, other) = (surfaces[side], surfaces[1 - side]);
+        let itself = own.key == other.key;
+        touches.clear();
+        let mut best: Option<Touch> = None;
+        for &(s, t) in near {
+            let s = s as usize;
+            if itself && are_neighbours(own, s, t as usize) {
+                continue;
+            }
+            let last = self.last_normal(&key(t)).map(|normal| if side == 0 { normal } else { -normal });
+            let carried = last.is_some();
+            let tolerance = if carried { STILL_BESIDE } else { BESIDE };
+            let touch = on_triangle(own, s, other, t as usize, tolerance, last);
+            let touch = touch.filter(|touch| carried || itself || !self.is_held(touch, other, 1 - side));
+            let Some(touch) = touch else { continue };
+            if carried {
+                touches.push(touch);
+            }
+            if touch.miss <= BESIDE && best.is_none_or(|b| touch.gap.abs() < b.gap.abs()) {
+                best = Some(touch);
+            }
+        }
+        if let Some(best) = best {
+            touches.retain(|t| t.triangle != best.triangle && t.normal.dot(&best.normal) < COPLANAR);
+            touches.push(best);
+        }
     }
 
     /// The normal of a contact that carried in the last step.
@@ -245,8 +240,8 @@ impl SoftDetector {
             let key = ConstraintKey::SoftPair(SoftPairContact { other: b.key, second: eb, first: ea, kind });
             let last = self.last_normal(&key);
             let carried = last.is_some();
-            let room = if carried { CARRYING_EDGES } else { NEW_EDGES };
-            let Some(crossing) = crossing(a, ea as usize, b, eb as usize, room, last) else { continue };
+            let tolerance = if carried { CARRYING_EDGES } else { NEW_EDGES };
+            let Some(crossing) = crossing(a, ea as usize, b, eb as usize, tolerance, last) else { continue };
             let holds = |side: usize| {
                 nodes[side].iter().all(|&n| {
                     let index = surfaces[side].model.surface.index_of_node[n as usize] as usize;
@@ -270,58 +265,6 @@ impl SoftDetector {
             self.closings.push(crossing.closing);
         }
     }
-}
-
-/// Surface node `s` of one body on triangle `t` of another, where it comes to lie within the step, or misses
-/// it by no more than `room`. A sheet's triangle has two endpoints: the node is on that where it was `last`, else where it
-/// is at the start of the step.
-fn on_triangle(
-    own: &SoftSurface<'_>,
-    s: usize,
-    other: &SoftSurface<'_>,
-    t: usize,
-    room: f64,
-    last: Option<Vec3>,
-) -> Option<Touch> {
-    let node = own.model.surface.nodes[s] as usize;
-    let nodes = other.model.surface.triangles[t].map(|n| n as usize);
-    let corners = nodes.map(|n| other.x[n]);
-    let [a, b, c] = corners;
-    let x = own.x[node];
-    let mut normal = other.faces[t];
-    if t >= other.model.surface.closed {
-        let side = last.unwrap_or(x - a);
-        normal *= if normal.dot(&side) < 0.0 { -1.0 } else { 1.0 };
-    }
-    let looks_away = !own.model.surface.is_thin[s] && normal.dot(&own.normals[s]) > FACING;
-    if normal == Vec3::zeros() || looks_away {
-        return None;
-    }
-    let height = normal.dot(&(x - a));
-    let index = |n: usize| other.model.surface.index_of_node[n] as usize;
-    let reach = own.reach[s] + nodes.iter().fold(0.0, |r: f64, &n| r.max(other.reach[index(n)]));
-    if !(height < reach && height > -DEEPEST * other.model.surface.mean_edge) {
-        return None;
-    }
-    // Where the two are when they meet.
-    let way = own.target[node] - x;
-    let ways = nodes.map(|n| other.target[n] - other.x[n]);
-    let closing = normal.dot(&((ways[0] + ways[1] + ways[2]) / 3.0 - way));
-    let closing = Closing::new(height, closing);
-    let when = closing.when;
-    let met = [0, 1, 2].map(|k| corners[k] + ways[k] * when);
-    let weights = barycentric(&met, &(x + way * when))?;
-    let miss = weights.iter().fold(0.0, |miss: f64, w| miss.max(-w));
-    if miss > room {
-        return None;
-    }
-    let weights = weights.map(|w| w.max(0.0));
-    let sum: f64 = weights.iter().sum();
-    let weights = weights.map(|w| w / sum);
-    let foot = a * weights[0] + b * weights[1] + c * weights[2];
-    let skins = nodes.iter().zip(weights).map(|(&n, w)| other.model.half_thickness[n] * w).sum::<f64>();
-    let gap = normal.dot(&(x - foot)) - skins - own.model.half_thickness[node];
-    Some(Touch { triangle: t, weights, normal, gap, miss, closing })
 }
 
 /// Whether a surface node and a triangle of the same body are too near in the mesh to touch.

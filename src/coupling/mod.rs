@@ -22,6 +22,9 @@ mod attachments;
 
 mod reactions;
 
+#[cfg(test)]
+mod tests;
+
 pub(crate) use attachments::{SteppedBodies, attachment_constraints, prescribed_nodes};
 pub(crate) use coefficients::{combined, combined_between};
 pub(crate) use neighbourhood::{RigidNeighbourhood, WalkContext};

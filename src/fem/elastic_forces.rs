@@ -73,28 +73,31 @@ pub(crate) struct Elastic {
     pub evaluated: usize,
 }
 
-/// Adds the elastic (and damping) forces \[N\] at positions `x` to `force`; `frame` is what the turn of
-/// the elements is measured against. Given up, with an infinite energy, as soon as that exceeds `limit` \[J\]:
-/// no element's is negative.
-pub(crate) fn add_forces(
-    elements: &Elements<'_>,
-    damping: &StiffnessDamping,
-    x: &[Vec3],
-    frame: &Mat3,
-    limit: f64,
-    force: &mut [Vec3],
-) -> Elastic {
+/// Where and against what energy and forces are evaluated.
+#[derive(Clone, Copy)]
+pub(crate) struct Evaluation<'a> {
+    pub damping: &'a StiffnessDamping,
+    pub x: &'a [Vec3],
+    /// What the turn of the elements is measured against.
+    pub frame: &'a Mat3,
+    /// Energy \[J\] above which the evaluation stops, with an infinite one: no element's is negative.
+    pub limit: f64,
+}
+
+/// Adds the elastic (and damping) forces \[N\] to `force`.
+pub(crate) fn add_forces(elements: &Elements<'_>, at: &Evaluation<'_>, force: &mut [Vec3]) -> Elastic {
     let Elements { model, material, .. } = elements;
     let mut elastic = if model.is_smoothed() {
-        add_smoothed_forces(model, material, damping, x, frame, limit, force)
+        add_smoothed_forces(model, material, at, force)
     } else {
         with_energy!(material, material.lame(), energy => {
-            sum_elements(energy, model, material, damping, x, frame, limit, force)
+            sum_elements(energy, model, material.lame(), at, force)
         })
     };
     if !(model.triangles.is_empty() && model.stencils.is_empty()) {
+        let StiffnessDamping { thin, ratio, .. } = at.damping;
         elastic.evaluated += model.triangles.len() + model.stencils.len();
-        elastic.energy += thin_elements::add_forces(elements, &damping.thin, damping.ratio, x, force);
+        elastic.energy += thin_elements::add_forces(elements, thin, *ratio, at.x, force);
     }
     elastic
 }
@@ -103,14 +106,11 @@ vectorized! {
 fn sum_elements[E: ElementEnergy](
     energy: E,
     model: &DeformableModel,
-    material: &DeformableMaterial,
-    damping: &StiffnessDamping,
-    x: &[Vec3],
-    frame: &Mat3,
-    limit: f64,
+    lame: Lame,
+    at: &Evaluation<'_>,
     force: &mut [Vec3],
 ) -> Elastic {
-    let lame = material.lame();
+    let Evaluation { damping, x, frame, limit } = *at;
     let mut total = Lane::default();
     let mut least_trace = Lane::splat(3.0);
     // In stages over a few blocks: each loop is short enough for the next block to start in it while
@@ -151,21 +151,19 @@ fn sum_elements[E: ElementEnergy](
 fn add_smoothed_forces(
     model: &DeformableModel,
     material: &DeformableMaterial,
-    damping: &StiffnessDamping,
-    x: &[Vec3],
-    frame: &Mat3,
-    limit: f64,
+    at: &Evaluation<'_>,
     force: &mut [Vec3],
 ) -> Elastic {
-    let Lame { mu, lambda } = material.lame();
+    let lame @ Lame { mu, lambda } = material.lame();
     let mut elastic = with_energy!(material, Lame { mu, lambda: 0.0 }, energy => {
-        sum_domains(energy, &model.domains, material, damping, x, frame, limit, force)
+        sum_domains(energy, &model.domains, lame, at, force)
     });
     if lambda > 0.0 && elastic.energy < f64::INFINITY {
         let bare = DeformableMaterial { strain_limits: None, ..*material };
-        let (undamped, rest) = (StiffnessDamping::default(), limit - elastic.energy);
+        let undamped = StiffnessDamping::default();
+        let rest = Evaluation { damping: &undamped, limit: at.limit - elastic.energy, ..*at };
         let volume = with_energy!(bare, Lame { mu: 0.0, lambda }, energy => {
-            sum_domains(energy, &model.volume_domains, material, &undamped, x, frame, rest, force)
+            sum_domains(energy, &model.volume_domains, lame, &rest, force)
         });
         elastic.energy += volume.energy;
         elastic.evaluated += volume.evaluated;
@@ -177,14 +175,11 @@ vectorized! {
 fn sum_domains[E: ElementEnergy](
     energy: E,
     domains: &SmoothingDomains,
-    material: &DeformableMaterial,
-    damping: &StiffnessDamping,
-    x: &[Vec3],
-    frame: &Mat3,
-    limit: f64,
+    lame: Lame,
+    at: &Evaluation<'_>,
     force: &mut [Vec3],
 ) -> Elastic {
-    let lame = material.lame();
+    let Evaluation { damping, x, frame, limit } = *at;
     let mut total = Lane::default();
     let mut least_trace = Lane::splat(3.0);
     for block in 0..domains.block_count() {
@@ -262,10 +257,15 @@ mod tests {
         DeformableModel::new(&TetMesh::cuboid([0.3, 0.2, 0.2], [3, 2, 2]).unwrap())
     }
 
+    fn free<'a>(damping: &'a StiffnessDamping, x: &'a [Vec3]) -> Evaluation<'a> {
+        const FRAME: Mat3 = Mat3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+        Evaluation { damping, x, frame: &FRAME, limit: f64::INFINITY }
+    }
+
     fn forces(material: &DeformableMaterial, damping: &StiffnessDamping, x: &[Vec3]) -> (f64, Vec<Vec3>) {
         let mut f = vec![Vec3::zeros(); x.len()];
         let elements = Elements { model: &model(), material, activation: 1.0 };
-        let elastic = add_forces(&elements, damping, x, &Mat3::identity(), f64::INFINITY, &mut f);
+        let elastic = add_forces(&elements, &free(damping, x), &mut f);
         (elastic.energy, f)
     }
 
@@ -310,7 +310,7 @@ mod tests {
             damping.begin(&model, beta, 0.01, &shaken(seed ^ 1, 0.05), None);
             let at = |x: &[Vec3]| {
                 let mut f = vec![Vec3::zeros(); x.len()];
-                let elastic = add_forces(&elements, &damping, x, &Mat3::identity(), f64::INFINITY, &mut f);
+                let elastic = add_forces(&elements, &free(&damping, x), &mut f);
                 (elastic.energy, f)
             };
             let x = shaken(seed, 0.05);
@@ -371,7 +371,7 @@ mod tests {
             let material = DeformableMaterial::new(1.0, 0.3).elasticity(elasticity);
             let mut f = vec![Vec3::zeros(); x.len()];
             let elements = Elements { model: &model, material: &material, activation: 1.0 };
-            add_forces(&elements, &StiffnessDamping::default(), &x, &Mat3::identity(), f64::INFINITY, &mut f);
+            add_forces(&elements, &free(&StiffnessDamping::default(), &x), &mut f);
             for (X, f) in model.rest.iter().zip(&f) {
                 if X.iter().all(|c| c.abs() < 0.29) {
                     assert!(f.norm() < 1e-10, "{elasticity:?}: {f}");

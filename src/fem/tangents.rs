@@ -74,7 +74,7 @@ mod tests {
     use super::super::model::DeformableModel;
     use super::*;
     use crate::energy::Elasticity;
-    use crate::fem::elastic_forces::{StiffnessDamping, add_forces};
+    use crate::fem::elastic_forces::{Evaluation, StiffnessDamping, add_forces};
     use crate::material::DeformableMaterial;
     use crate::mesh::{Structure, TetMesh};
     use nalgebra::DMatrix;
@@ -100,7 +100,9 @@ mod tests {
 
     fn forces(elements: &Elements<'_>, x: &[Vec3]) -> Vec<Vec3> {
         let mut f = vec![Vec3::zeros(); x.len()];
-        add_forces(elements, &StiffnessDamping::default(), x, &Mat3::identity(), f64::INFINITY, &mut f);
+        let (damping, frame) = (StiffnessDamping::default(), Mat3::identity());
+        let at = Evaluation { damping: &damping, x, frame: &frame, limit: f64::INFINITY };
+        add_forces(elements, &at, &mut f);
         f
     }
 

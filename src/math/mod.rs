@@ -113,9 +113,11 @@ pub(crate) fn rotation_from_vector(w: &Vec3) -> Mat3 {
     nalgebra::Rotation3::new(*w).into_inner()
 }
 
-/// Rotation vector \[rad\] of a rotation.
+/// Rotation vector \[rad\] of a rotation. By its quaternion: the cosine of the trace knows angles to 1.5e-8 only, and is NaN
+/// where rounding takes it past one.
 pub(crate) fn rotation_vector(R: &Mat3) -> Vec3 {
-    nalgebra::Rotation3::from_matrix_unchecked(*R).scaled_axis()
+    let rotation = nalgebra::Rotation3::from_matrix_unchecked(*R);
+    nalgebra::UnitQuaternion::from_rotation_matrix(&rotation).scaled_axis()
 }
 
 /// A rotation rounded to that many binary places of its quaternion.

@@ -70,34 +70,37 @@ impl Surface {
         }
         let alone = (0..edges.len()).filter(|&e| edge_triangles[e][0] == NONE);
         let segments: Vec<u32> = alone.map(|e| e as u32).collect();
-        let mut node_facet = vec![NONE; nodes.len()];
-        let mut stand = |n: u32, facet: usize| node_facet[index_of_node[n as usize] as usize] = facet as u32;
-        for (s, &e) in segments.iter().enumerate() {
-            edges[e as usize].iter().for_each(|&n| stand(n, triangles.len() + s));
-        }
-        for (t, triangle) in triangles.iter().enumerate() {
-            triangle.iter().for_each(|&n| stand(n, t));
-        }
-        let mut is_thin = vec![true; nodes.len()];
-        triangles[..closed]
-            .iter()
-            .flatten()
-            .for_each(|&n| is_thin[index_of_node[n as usize] as usize] = false);
-        let length = |e: &[u32; 2]| (rest[e[0] as usize] - rest[e[1] as usize]).norm();
-        let mean_edge = edges.iter().map(length).sum::<f64>() / edges.len().max(1) as f64;
-        Self {
+        let mut surface = Self {
             triangles,
             closed,
+            node_facet: vec![NONE; nodes.len()],
+            is_thin: vec![true; nodes.len()],
             nodes,
             edges,
             triangle_edges,
             edge_triangles,
             segments,
-            node_facet,
-            is_thin,
             index_of_node,
-            mean_edge,
+            mean_edge: 0.0,
+        };
+        surface.describe_nodes();
+        let length = |e: &[u32; 2]| (rest[e[0] as usize] - rest[e[1] as usize]).norm();
+        surface.mean_edge = surface.edges.iter().map(length).sum::<f64>() / surface.edges.len().max(1) as f64;
+        surface
+    }
+
+    /// Finds a facet of every node, and which nodes no solid has.
+    fn describe_nodes(&mut self) {
+        let index = |n: u32| self.index_of_node[n as usize] as usize;
+        for (s, &e) in self.segments.iter().enumerate() {
+            let facet = (self.triangles.len() + s) as u32;
+            self.edges[e as usize].iter().for_each(|&n| self.node_facet[index(n)] = facet);
         }
+        for (t, triangle) in self.triangles.iter().enumerate() {
+            triangle.iter().for_each(|&n| self.node_facet[index(n)] = t as u32);
+        }
+        let solid = self.triangles[..self.closed].iter().flatten();
+        solid.for_each(|&n| self.is_thin[index(n)] = false);
     }
 
     /// Nodes of a facet.

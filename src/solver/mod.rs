@@ -18,6 +18,10 @@ pub(crate) mod constraints;
 mod island;
 
 #[cfg(test)]
+mod cone_tests;
+#[cfg(test)]
+mod island_tests;
+#[cfg(test)]
 mod tests;
 
 pub(crate) use body_step::{BodyProblem, SECOND_ORDER};

@@ -5,7 +5,7 @@
 //! damping of the step. The residual is `r = −∂Ψ/∂x` \[N\]; pinned nodes are not unknowns.
 
 use crate::body::{DeformableBody, Integrator, PrescribedNode, SolverSettings};
-use crate::fem::elastic_forces::StiffnessDamping;
+use crate::fem::elastic_forces::{Evaluation, StiffnessDamping};
 use crate::fem::{DeformableModel, Elements, elastic_forces};
 use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3, rotation_from_vector, skew, solve_semidefinite};
@@ -307,10 +307,9 @@ impl BodyProblem {
         at.r.resize(at.x.len(), Vec3::zeros());
         let (model, material, activation) = (&*self.model, &self.material, self.activation);
         let elements = Elements { model, material, activation };
+        let place = Evaluation { damping: &self.damping, x: &at.x, frame: &self.frame, limit };
         let time = &mut self.preconditioner.counters.element_time;
-        let elastic = timed(time, || {
-            elastic_forces::add_forces(&elements, &self.damping, &at.x, &self.frame, limit, &mut at.r)
-        });
+        let elastic = timed(time, || elastic_forces::add_forces(&elements, &place, &mut at.r));
         self.preconditioner.counters.elements += elastic.evaluated;
         if elastic.energy == f64::INFINITY {
             at.objective = f64::INFINITY;

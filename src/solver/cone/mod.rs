@@ -11,4 +11,4 @@ mod newton;
 pub(crate) use newton::ConeSolver;
 pub(crate) use problem::{ConeProblem, ConeTolerance, ConeWork};
 #[cfg(test)]
-pub(crate) use projection::project;
+pub(in crate::solver) use {problem::spatial, projection::project};

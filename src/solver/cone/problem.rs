@@ -59,7 +59,7 @@ pub(super) fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, larger)
 }
 
-pub(super) fn spatial(rows: &[f64]) -> [f64; 3] {
+pub(in crate::solver) fn spatial(rows: &[f64]) -> [f64; 3] {
     match rows {
         [n, t1, t2] => [*n, *t1, *t2],
         [n, ..] => [*n, 0.0, 0.0],

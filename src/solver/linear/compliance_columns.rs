@@ -3,9 +3,9 @@
 //! Of each column only the rows of surface nodes are kept. Blocks are in the rest frame; frames
 //! rotate them.
 
+use super::coefficients::dimension;
 use super::factor::{BATCH, FactorScratch, Symbolic};
 use super::factor_values::Factor;
-use super::system::dimension;
 use crate::fem::{DeformableModel, SystemMatrix};
 use crate::math::Mat3;
 use crate::mesh::Surface;

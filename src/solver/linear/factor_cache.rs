@@ -4,6 +4,7 @@
 //! an old one; it only takes longer.
 
 use super::clusters::Clusters;
+use super::coefficients::{dimension, stiffening};
 use super::compliance_columns::ComplianceColumns;
 use super::factor::{BATCH, FactorScratch, Symbolic};
 use super::factor_values::Factor;
@@ -113,61 +114,8 @@ impl FactorCache {
     ) -> Option<CacheWork> {
         let mut work = CacheWork::default();
         if !self.places.contains_key(key) {
-            let has_matrix = key.solver != Solver::ConjugateGradients;
-            let name = (key.model, key.system, has_matrix);
-            let symbolic = match self.symbolic.get(&name) {
-                Some(symbolic) => symbolic.clone(),
-                None => {
-                    let made = match has_matrix {
-                        true => system::pattern_of(&body.model, key.system)?,
-                        false => {
-                            let d = system::dimension(key.system);
-                            Symbolic::without_matrix(d, body.model.rest.len())
-                        }
-                    };
-                    let made = Arc::new(made);
-                    self.symbolic.insert(name, made.clone());
-                    made
-                }
-            };
-            let assembled =
-                || system::assemble(&body.model, &body.material, &key.pins, key.system, h, &symbolic);
-            let factor = match key.solver {
-                Solver::Projective => {
-                    let values = assembled();
-                    let factor = symbolic.factorize(&values, &mut self.scratch).ok()?;
-                    let is_single =
-                        system::in_single_precision(body, !key.pins.is_empty(), h, &symbolic, &values);
-                    if is_single { factor.rounded() } else { factor }
-                }
-                Solver::ConjugateGradients => {
-                    let (model, material) = (&body.model, &body.material);
-                    let operator = StiffnessOperator::new(model, material, &key.pins, key.system, h);
-                    Factor::Iterative(Box::new(operator))
-                }
-                Solver::GaussSeidel => Factor::GaussSeidel(assembled()),
-                // Newton's method makes its own, and falls back on this.
-                Solver::Jacobi | Solver::Newton => {
-                    Factor::Jacobi(symbolic.upper(&assembled()).inverse_row_sums())
-                }
-            };
+            self.make(key, body, h)?;
             work.factorizations = 1;
-            let columns = ComplianceColumns::new(&body.model.surface, key.system);
-            let clusters = (key.clusters > 0).then(|| {
-                let weight = laplacian_weight(&body.material) * system::stiffening(&body.material, h);
-                let (pins, scratch) = (&key.pins, &mut self.scratch);
-                Clusters::new(&body.model, key.clusters, weight, pins, &symbolic, &factor, scratch)
-            });
-            let serial = self.made;
-            let made = Entry {
-                made: SystemFactor { symbolic, factor, system: key.system, columns, clusters, serial },
-                key: key.clone(),
-                model: body.model.clone(),
-                last_used: self.step,
-            };
-            self.made += 1;
-            self.places.insert(key.clone(), self.factors.len());
-            self.factors.push(made);
         }
         work.id = FactorId(*self.places.get(key)?);
         let entry = &mut self.factors[work.id.0];
@@ -177,13 +125,82 @@ impl FactorCache {
         Some(work)
     }
 
+    /// The pattern of a body's matrix, made once per model.
+    fn pattern(&mut self, key: &FactorKey, body: &DeformableBody) -> Option<Arc<Symbolic>> {
+        let has_matrix = key.solver != Solver::ConjugateGradients;
+        let name = (key.model, key.system, has_matrix);
+        if let Some(symbolic) = self.symbolic.get(&name) {
+            return Some(symbolic.clone());
+        }
+        let made = match has_matrix {
+            true => system::pattern_of(&body.model, key.system)?,
+            false => Symbolic::without_matrix(dimension(key.system), body.model.rest.len()),
+        };
+        let made = Arc::new(made);
+        self.symbolic.insert(name, made.clone());
+        Some(made)
+    }
+
+    /// Makes and keeps the factor of a body.
+    fn make(&mut self, key: &FactorKey, body: &DeformableBody, h: f64) -> Option<()> {
+        let symbolic = self.pattern(key, body)?;
+        let factor = self.factor_of(key, body, h, &symbolic)?;
+        let columns = ComplianceColumns::new(&body.model.surface, key.system);
+        let clusters = (key.clusters > 0).then(|| {
+            let weight = laplacian_weight(&body.material) * stiffening(&body.material, h);
+            let (pins, scratch) = (&key.pins, &mut self.scratch);
+            Clusters::new(&body.model, key.clusters, weight, pins, &symbolic, &factor, scratch)
+        });
+        let serial = self.made;
+        let made = Entry {
+            made: SystemFactor { symbolic, factor, system: key.system, columns, clusters, serial },
+            key: key.clone(),
+            model: body.model.clone(),
+            last_used: self.step,
+        };
+        self.made += 1;
+        self.places.insert(key.clone(), self.factors.len());
+        self.factors.push(made);
+        Some(())
+    }
+
+    /// The numbers of a factor, or what the body's solver has in its place.
+    fn factor_of(
+        &mut self,
+        key: &FactorKey,
+        body: &DeformableBody,
+        h: f64,
+        symbolic: &Symbolic,
+    ) -> Option<Factor> {
+        let assembled = || system::assemble(&body.model, &body.material, &key.pins, key.system, h, symbolic);
+        Some(match key.solver {
+            Solver::Projective => {
+                let values = assembled();
+                let factor = symbolic.factorize(&values, &mut self.scratch).ok()?;
+                let is_pinned = !key.pins.is_empty();
+                let is_single = system::in_single_precision(body, is_pinned, h, symbolic, &values);
+                if is_single { factor.rounded() } else { factor }
+            }
+            Solver::ConjugateGradients => {
+                let (model, material) = (&body.model, &body.material);
+                let operator = StiffnessOperator::new(model, material, &key.pins, key.system, h);
+                Factor::Iterative(Box::new(operator))
+            }
+            Solver::GaussSeidel => Factor::GaussSeidel(assembled()),
+            // Newton's method makes its own, and falls back on this.
+            Solver::Jacobi | Solver::Newton => {
+                Factor::Jacobi(symbolic.upper(&assembled()).inverse_row_sums())
+            }
+        })
+    }
+
     /// Makes the columns of the first of these surface nodes that have none: one batch of them, so that
     /// a coming touch finds them there. Returns how many.
     pub fn prepare_ahead(&mut self, id: FactorId, pins: &[u32], surface_nodes: &[u32]) -> usize {
         let Entry { made, model, .. } = &mut self.factors[id.0];
         let SystemFactor { symbolic, factor, columns, system, .. } = made;
         let missing = surface_nodes.iter().copied().filter(|s| !columns.has(*s));
-        let batch: Vec<u32> = missing.take(BATCH / system::dimension(*system)).collect();
+        let batch: Vec<u32> = missing.take(BATCH / dimension(*system)).collect();
         columns.prepare(model, pins, symbolic, factor, batch.into_iter(), &mut self.scratch)
     }
 

@@ -1,5 +1,6 @@
 //! Linear algebra: the constant matrix, what stands for its inverse, and the preconditioner that both make.
 
+mod coefficients;
 mod supernodes;
 
 mod gauss_seidel;

@@ -1,7 +1,7 @@
 //! The constant matrix as what it does, element by element, without being put together: for conjugate gradients
 //! on bodies whose factor would not fit, or would be made anew all the time.
 
-use super::system::{dimension, inertia, stiffening};
+use super::coefficients::{dimension, inertia, stiffening};
 use crate::fem::constant_matrix::{add_blocks, subtract_product};
 use crate::fem::{DeformableModel, Elements, SystemMatrix};
 use crate::material::DeformableMaterial;

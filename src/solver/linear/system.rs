@@ -6,6 +6,7 @@
 //! A pinned node has the identity for its row and column, so every set of pins shares one symbolic
 //! factor.
 
+use super::coefficients::{dimension, inertia, stiffening};
 use super::factor::Symbolic;
 use crate::body::{DeformableBody, FactorPrecision, Solver};
 use crate::fem::constant_matrix::add_blocks;
@@ -66,14 +67,6 @@ impl FactorKey {
     }
 }
 
-/// Unknowns per node.
-pub(crate) fn dimension(system: SystemMatrix) -> usize {
-    match system {
-        SystemMatrix::RestStiffness => 3,
-        SystemMatrix::Laplacian => 1,
-    }
-}
-
 /// The sparsity of a body's matrix.
 pub(crate) fn pattern_of(model: &DeformableModel, system: SystemMatrix) -> Option<Symbolic> {
     let (mut starts, mut rows) = (vec![0], Vec::new());
@@ -99,16 +92,6 @@ pub(crate) fn assemble(
     let elements = Elements { model, material, activation: 1.0 };
     add_blocks(&elements, system, |i, j, block| matrix.add_elastic(i, j, &(block * stiffening)));
     matrix.values
-}
-
-/// Factor of stiffness damping on the elastic part of the matrix, 1 + β/h.
-pub(crate) fn stiffening(material: &DeformableMaterial, h: f64) -> f64 {
-    1.0 + material.stiffness_damping / h
-}
-
-/// Inertia per volume in the matrix, (1 + αh) ρ/h² [N/m per m³].
-pub(crate) fn inertia(material: &DeformableMaterial, h: f64) -> f64 {
-    material.density * (1.0 + material.mass_damping * h) / (h * h)
 }
 
 /// The values of a body's Hessian at `x`, in the order of [`Symbolic::rows`], of `3n` unknowns. Of stiffness
