@@ -110,7 +110,6 @@ fn a_weight_hangs_from_a_soft_block_on_a_ball_joint() {
 
 /// Contacts of a face with what it is glued to are redundant: nothing says what they carry, but it is not more and more.
 #[test]
-#[ignore = "glue and contacts of the same face work up forces against each other, some 10 N a step"]
 fn glue_without_a_gap_carries_what_hangs_on_it_too() {
     let ball = SphericalJointBuilder::new().local_anchor2(Vector::Y * 0.2);
     let mut hanging = Hanging::glued_across(0.0, ball, 0.0);
@@ -295,7 +294,6 @@ fn a_ball_joint_keeps_its_length_while_a_soft_load_swings() {
 }
 
 #[test]
-#[ignore = "ties and contacts of the same face work up energy against each other when they turn"]
 fn a_swing_with_a_load_that_touches_what_it_is_tied_to_gains_no_energy() {
     let (_, gained) = swing(Some(0.0));
     assert!(gained < TIMING, "{gained} J");
@@ -303,7 +301,6 @@ fn a_swing_with_a_load_that_touches_what_it_is_tied_to_gains_no_energy() {
 
 /// No joint of rapier forbids two anchors to pass: it holds ropes to their greatest length only.
 #[test]
-#[ignore = "a rope's lower limit of zero stops what passes its anchor: a fault of joint_rows::limit_rows"]
 fn a_slack_rope_lets_a_carrier_pass_its_anchor() {
     for soft in [false, true] {
         let mut physics = PhysicsWorld::new();

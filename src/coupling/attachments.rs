@@ -50,6 +50,20 @@ pub(crate) fn prescribed_nodes(
     }
 }
 
+/// Lists the nodes that hard attachments hold to rigid bodies, each with its body and the rigid body's proxy.
+pub(crate) fn attached_nodes(
+    deformables: &DeformableBodySet,
+    scene: &mut RapierScene,
+    context: &StepContext<'_>,
+    attached: &mut Vec<(DeformableBodyHandle, ProxyId, u32)>,
+) {
+    for (_, attachment) in deformables.attachments().filter(|(_, a)| a.is_hard()) {
+        let Anchors::Rigid(rigid, _) = &attachment.anchors else { continue };
+        let Some(proxy) = scene.body_proxy(context, *rigid) else { continue };
+        attached.extend(attachment.nodes.iter().map(|node| (attachment.body(), proxy, *node)));
+    }
+}
+
 /// What attachments have to know of the bodies that are stepped.
 pub(crate) trait SteppedBodies {
     /// Place in the step's list; `None` of bodies that are not stepped.

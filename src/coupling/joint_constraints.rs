@@ -10,8 +10,9 @@ use crate::contact::{Constraint, Endpoint, Law, ProxyId};
 use crate::math::{Mat3, Pose64, Vec3, rotation_vector};
 use crate::solver::RigidProxies;
 use rapier3d::dynamics::{
-    GenericJoint, ImpulseJointHandle, JointAxesMask, JointMotor, MotorModel, RigidBodyHandle,
+    GenericJoint, ImpulseJointHandle, JointAxesMask, JointLimits, JointMotor, MotorModel, RigidBodyHandle,
 };
+use std::f64::consts::TAU;
 
 /// What names a joint in the keys of its constraints.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,7 +74,8 @@ pub(super) fn joint_constraints(
     if !coupled.is_empty() {
         let coordinate = distance(coupled, ends, &frame1, &frame2);
         let first = coupled.bits().trailing_zeros() as usize;
-        limit_constraints(joint, first, &coordinate, constraints);
+        // Rapier's coupled axes have no lower limit: a rope lets what it holds pass its anchor.
+        coordinate.limit_above(&joint.limits[first], has_limit(joint, first), constraints);
         motor_constraint(joint, first, &coordinate, proxies, dt, constraints);
     }
     for axis in 0..6 {
@@ -112,25 +114,29 @@ pub(super) fn drive_constraints(
     joint_constraints(&free, ends, proxies, dt, constraints);
 }
 
+fn has_limit(joint: &GenericJoint, axis: usize) -> bool {
+    joint.limit_axes.intersects(JointAxesMask::from_bits_truncate(1 << axis))
+}
+
+/// Between two limits; zero where one is missing.
+fn middle(limits: &JointLimits<f32>) -> f64 {
+    let is_range = limits.min > -UNLIMITED && limits.max < UNLIMITED;
+    if is_range { 0.5 * (f64::from(limits.min) + f64::from(limits.max)) } else { 0.0 }
+}
+
 fn limit_constraints(
     joint: &GenericJoint,
     axis: usize,
     coordinate: &Coordinate,
     constraints: &mut Vec<Constraint>,
 ) {
-    if !joint.limit_axes.intersects(JointAxesMask::from_bits_truncate(1 << axis)) {
-        return;
-    }
     let limits = &joint.limits[axis];
-    if limits.min > -UNLIMITED {
-        constraints
-            .push(coordinate.constraint(coordinate.value - f64::from(limits.min), JointRole::LowerLimit));
+    if has_limit(joint, axis) && limits.min > -UNLIMITED {
+        // As rapier measures angles: from the middle between the limits.
+        let value = coordinate.value_near(middle(limits));
+        constraints.push(coordinate.constraint(value - f64::from(limits.min), JointRole::LowerLimit));
     }
-    if limits.max < UNLIMITED {
-        constraints.push(
-            coordinate.reversed().constraint(f64::from(limits.max) - coordinate.value, JointRole::UpperLimit),
-        );
-    }
+    coordinate.limit_above(limits, has_limit(joint, axis), constraints);
 }
 
 /// A motor's force `−k(q − q*) − d(q̇ − q̇*)` at the end of the step is a constraint that gives way by
@@ -156,7 +162,8 @@ fn motor_constraint(
     if !(stiffness > 0.0 && stiffness.is_finite() && motor.max_force > 0.0) {
         return;
     }
-    let target = k * (coordinate.value - f64::from(motor.target_pos)) - d * f64::from(motor.target_vel);
+    let off = coordinate.value_near(motor.target_pos.into()) - f64::from(motor.target_pos);
+    let target = k * off - d * f64::from(motor.target_vel);
     let mut constraint = coordinate.constraint(target / stiffness, JointRole::Motor);
     constraint.compliance = 1.0 / stiffness;
     let limit = if motor.max_force < UNLIMITED { f64::from(motor.max_force) } else { f64::INFINITY };
@@ -234,6 +241,23 @@ impl Coordinate {
     /// A constraint along the coordinate.
     fn constraint(&self, gap: f64, role: JointRole) -> Constraint {
         Constraint::new(self.endpoints, self.axis, gap, self.name.key(self.number, role))
+    }
+
+    /// The value; of an angle the turn that is nearest to another one.
+    fn value_near(&self, other: f64) -> f64 {
+        let is_angle = matches!(self.endpoints[0], Endpoint::Rotation { .. });
+        if !is_angle || !other.is_finite() {
+            return self.value;
+        }
+        self.value - TAU * ((self.value - other) / TAU).round()
+    }
+
+    fn limit_above(&self, limits: &JointLimits<f32>, is_limited: bool, constraints: &mut Vec<Constraint>) {
+        if is_limited && limits.max < UNLIMITED {
+            let value = self.value_near(middle(limits));
+            let gap = f64::from(limits.max) - value;
+            constraints.push(self.reversed().constraint(gap, JointRole::UpperLimit));
+        }
     }
 
     fn reversed(&self) -> Self {

@@ -25,7 +25,7 @@ mod reactions;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use attachments::{SteppedBodies, attachment_constraints, prescribed_nodes};
+pub(crate) use attachments::{SteppedBodies, attached_nodes, attachment_constraints, prescribed_nodes};
 pub(crate) use coefficients::{combined, combined_between};
 pub(crate) use neighbourhood::{RigidNeighbourhood, WalkContext};
 pub use parts::PhysicsParts;

@@ -6,7 +6,9 @@ use super::threads::for_each;
 use super::work::BodyWork;
 use crate::body::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet};
 use crate::contact::Endpoint;
-use crate::coupling::{StepContext, SteppedBodies, WalkContext, attachment_constraints, prescribed_nodes};
+use crate::coupling::{
+    StepContext, SteppedBodies, WalkContext, attached_nodes, attachment_constraints, prescribed_nodes,
+};
 
 impl StepScratch {
     pub(super) fn read_obstacles(&mut self, context: &StepContext<'_>) {
@@ -45,6 +47,8 @@ impl StepScratch {
         }
         self.prescribed.clear();
         prescribed_nodes(deformables, &mut self.scene, context, recovery, &mut self.prescribed);
+        self.attached.clear();
+        attached_nodes(deformables, &mut self.scene, context, &mut self.attached);
         self.predict_from(0, deformables, context);
     }
 
@@ -61,6 +65,10 @@ impl StepScratch {
             let own = self.prescribed.iter().filter(|(body, _)| *body == work.handle);
             work.prescribed.clear();
             work.prescribed.extend(own.map(|(_, node)| *node));
+            let own = self.attached.iter().filter(|(body, ..)| *body == work.handle);
+            work.attached.clear();
+            work.attached.extend(own.map(|(_, proxy, node)| (*proxy, *node)));
+            work.attached.sort_unstable();
         }
         for_each(&mut self.works[first..], |work| {
             work.predict(&deformables[work.handle], context.h, &context.gravity);

@@ -5,7 +5,7 @@ use super::sleeping::Sleeping;
 use super::soft_pairs::SoftPairDetection;
 use super::work::{BodyWork, IslandWork};
 use crate::body::{DeformableBodyHandle, PrescribedNode};
-use crate::contact::{Candidates, Constraint};
+use crate::contact::{Candidates, Constraint, ProxyId};
 use crate::coupling::{RapierScene, Reactions, RigidNeighbourhood};
 use crate::pipeline::{
     DeformableContact, DeformableCounters, DeformablePairContact, JointForce, RigidContact,
@@ -31,6 +31,8 @@ pub(in crate::pipeline) struct StepScratch {
     pub(super) soft_pairs: SoftPairDetection,
     /// Nodes that attachments prescribe.
     pub(super) prescribed: Vec<(DeformableBodyHandle, PrescribedNode)>,
+    /// Nodes that hard attachments hold to rigid bodies.
+    pub(super) attached: Vec<(DeformableBodyHandle, ProxyId, u32)>,
     /// Constraints of attachments and of contacts between deformables.
     pub(super) linking: Vec<Constraint>,
     pub(super) reaction_list: Vec<Reaction>,

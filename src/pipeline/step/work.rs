@@ -6,7 +6,7 @@ use crate::body::{
     PrescribedNode, is_number,
 };
 use crate::contact::{
-    Candidates, Constraint, Detector, Endpoint, Pair, STATIC_MARGIN, SoftSurface, SurfaceTree,
+    Candidates, Constraint, Detector, Endpoint, Pair, ProxyId, STATIC_MARGIN, SoftSurface, SurfaceTree,
 };
 use crate::coupling::{RapierScene, RapierSets, combined, packed};
 use crate::math::Vec3;
@@ -31,6 +31,8 @@ pub(super) struct BodyWork {
     distances: Vec<(f32, u32)>,
     /// Nodes that attachments and contacts with other deformables act on.
     pub linked_nodes: Vec<u32>,
+    /// Nodes that hard attachments hold to a rigid body, by that body's proxy, ascending: they do not collide with it.
+    pub attached: Vec<(ProxyId, u32)>,
     /// Nodes that attachments prescribe.
     pub prescribed: Vec<PrescribedNode>,
     /// Box around all that the body may touch over the step.
@@ -58,6 +60,7 @@ impl BodyWork {
             ahead: Vec::new(),
             distances: Vec::new(),
             linked_nodes: Vec::new(),
+            attached: Vec::new(),
             prescribed: Vec::new(),
             extent: Aabb::new_invalid(),
             has_neighbours: false,
@@ -105,6 +108,14 @@ impl BodyWork {
     pub fn is_fully_pinned(&self, endpoint: &Endpoint) -> bool {
         let pins = self.problem.as_ref().map(|problem| &problem.key.pins);
         endpoint.soft_nodes().all(|(node, _)| pins.is_some_and(|p| p.binary_search(&(node as u32)).is_ok()))
+    }
+
+    /// Whether all nodes of the first endpoint are attached to what the second one is on. What holds them in all
+    /// directions and a contact that differs from it by rounding would work up forces against each other, step by step.
+    fn is_attached(&self, endpoints: &[Endpoint; 2]) -> bool {
+        let Some(proxy) = endpoints[1].proxy() else { return false };
+        let is_attached = |node: usize| self.attached.binary_search(&(proxy, node as u32)).is_ok();
+        !self.attached.is_empty() && endpoints[0].soft_nodes().all(|(node, _)| is_attached(node))
     }
 
     /// Whether an attachment prescribes a node for the step.
@@ -171,6 +182,9 @@ impl BodyWork {
         constraints.retain_mut(|constraint| {
             // Between a pinned node and what does not yield there is nothing to solve for.
             let pinned = self.is_fully_pinned(&constraint.endpoints[0]);
+            if self.is_attached(&constraint.endpoints) {
+                return false;
+            }
             let yields = |endpoint: &Endpoint| endpoint.proxy().is_some_and(|id| scene.proxies.yields(id));
             if let Some(memory) = body.state.contact(&constraint.key) {
                 constraint.warm_start(memory);
