@@ -20,7 +20,7 @@ pub(crate) struct Candidates {
 const FEW: usize = 32;
 
 impl Candidates {
-    /// Takes in the obstacles of this step.
+    /// Refits to the obstacles of this step.
     pub fn update(&mut self, obstacles: &[Obstacle]) {
         self.still.clear();
         self.moving.clear();

@@ -17,7 +17,7 @@ const FIRST_POINT: u32 = 1;
 impl Detector {
     /// Closest points that carried in the last step are looked at again where they were. One closest
     /// point per triangle is not enough where a surface wraps around another: pushed in at one
-    /// point, the next one is elsewhere, and without memory the two would take turns for ever. Rows with
+    /// point, the next one is elsewhere, and without memory the two would take turns for ever. Contacts with
     /// shapes of plane faces have no slots, and so none is kept: beside an edge the normal of a face is not
     /// the one of the contact.
     pub(super) fn keep_points(

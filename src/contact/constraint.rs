@@ -1,4 +1,5 @@
-//! A contact as the solver sees it: three constraints (normal and two tangents), or one without friction.
+//! A constraint as the solver sees it: three components (normal and two tangents), or one if it is bilateral or without
+//! friction.
 
 use super::obstacle::ProxyId;
 use crate::body::{ConstraintGeometry, ConstraintKey, ConstraintMemory};
@@ -73,14 +74,14 @@ impl Constraint {
         }
     }
 
-    /// Takes up what the last step has left of this contact.
+    /// Starts from what the last step has left of this constraint.
     pub fn warm_start(&mut self, memory: &ConstraintMemory) {
         self.warm_force = memory.force;
         self.warm_shift_rate = memory.shift_rate;
         self.warm_geometry = Some(memory.geometry);
     }
 
-    /// Rows of this contact in the solver: three, or one without friction.
+    /// Components of this constraint in the solver: three, or one.
     pub fn dimension(&self) -> usize {
         match self.law {
             Law::Contact { friction } if friction > 0.0 => 3,
@@ -88,7 +89,7 @@ impl Constraint {
         }
     }
 
-    /// Directions of those constraints.
+    /// Directions of those components.
     pub fn directions(&self) -> &[Vec3] {
         &self.frame[..self.dimension()]
     }
@@ -116,7 +117,7 @@ impl Endpoint {
         pairs.filter(|(_, w)| *w != 0.0).map(|(n, w)| (n as usize, w))
     }
 
-    /// The rigid proxy of a endpoint that has one.
+    /// The rigid proxy of an endpoint that has one.
     pub fn proxy(&self) -> Option<ProxyId> {
         match self {
             Endpoint::Soft { .. } => None,

@@ -38,8 +38,8 @@ pub(crate) struct SoftDetector {
     touches: Vec<Touch>,
     /// When each constraint closes, as part of the step, and how much it closes in all of it \[m\].
     closings: Vec<Closing>,
-    /// Per surface node: the normal of its constraint, towards its own body.
-    held: [Vec<Option<Vec3>>; 2],
+    /// Per surface node: the normal of its contact, towards its own body.
+    pushed: [Vec<Option<Vec3>>; 2],
 }
 
 impl SoftDetector {
@@ -59,21 +59,21 @@ impl SoftDetector {
         self.carried.extend(carried.map(|m| (m.key, m.geometry.frame[0])));
         let itself = a.key == b.key;
         self.collect(surfaces, itself);
-        for (held, surface) in self.held.iter_mut().zip(surfaces) {
-            held.clear();
-            held.resize(surface.model.surface.nodes.len(), None);
+        for (pushed, surface) in self.pushed.iter_mut().zip(surfaces) {
+            pushed.clear();
+            pushed.resize(surface.model.surface.nodes.len(), None);
         }
         self.closings.clear();
         let first = constraints.len();
         let finer = usize::from(b.model.surface.mean_edge < a.model.surface.mean_edge);
         for side in [finer, 1 - finer] {
-            // One's own surface was listed on both endpoints alike.
+            // One's own surface was listed on both sides alike.
             if !(itself && side != finer) {
                 self.touch(pair, surfaces, side, constraints);
             }
         }
         if itself {
-            let [first, second] = &mut self.held;
+            let [first, second] = &mut self.pushed;
             let (from, to) = if finer == 0 { (first, second) } else { (second, first) };
             to.clone_from(from);
         }
@@ -158,7 +158,7 @@ impl SoftDetector {
             };
             self.touches_of_node(surfaces, side, near, &key, &mut touches);
             let Some(last) = touches.last() else { continue };
-            self.held[side][s] = Some(last.normal);
+            self.pushed[side][s] = Some(last.normal);
             for touch in &touches {
                 let own_endpoint = Endpoint::node(own.body, node);
                 let nodes = other.model.surface.triangles[touch.triangle];
@@ -198,7 +198,7 @@ impl SoftDetector {
             let carried = last.is_some();
             let tolerance = if carried { STILL_BESIDE } else { BESIDE };
             let touch = on_triangle(own, s, other, t as usize, tolerance, last);
-            let touch = touch.filter(|touch| carried || itself || !self.is_held(touch, other, 1 - side));
+            let touch = touch.filter(|touch| carried || itself || !self.is_kept_off(touch, other, 1 - side));
             let Some(touch) = touch else { continue };
             if carried {
                 touches.push(touch);
@@ -220,10 +220,10 @@ impl SoftDetector {
     }
 
     /// Whether the nodes of a triangle have constraints already that keep it from what touches it.
-    fn is_held(&self, touch: &Touch, surface: &SoftSurface<'_>, side: usize) -> bool {
+    fn is_kept_off(&self, touch: &Touch, surface: &SoftSurface<'_>, side: usize) -> bool {
         surface.model.surface.triangles[touch.triangle].iter().all(|&n| {
             let index = surface.model.surface.index_of_node[n as usize] as usize;
-            self.held[side][index].is_some_and(|held| held.dot(&touch.normal) < -PARALLEL)
+            self.pushed[side][index].is_some_and(|pushed| pushed.dot(&touch.normal) < -PARALLEL)
         })
     }
 
@@ -242,13 +242,14 @@ impl SoftDetector {
             let carried = last.is_some();
             let tolerance = if carried { CARRYING_EDGES } else { NEW_EDGES };
             let Some(crossing) = crossing(a, ea as usize, b, eb as usize, tolerance, last) else { continue };
-            let holds = |side: usize| {
+            let is_kept_off = |side: usize| {
                 nodes[side].iter().all(|&n| {
                     let index = surfaces[side].model.surface.index_of_node[n as usize] as usize;
-                    self.held[side][index].is_some_and(|held| held.dot(&crossing.normal).abs() > PARALLEL)
+                    self.pushed[side][index]
+                        .is_some_and(|pushed| pushed.dot(&crossing.normal).abs() > PARALLEL)
                 })
             };
-            if !carried && (holds(0) || holds(1)) {
+            if !carried && (is_kept_off(0) || is_kept_off(1)) {
                 continue;
             }
             let soft = |k: usize, body: usize| {

@@ -172,7 +172,7 @@ impl Projection {
         let gap = normal.dot(&(p - self.point));
         let flat = self.face.is_some_and(|n| n == normal || n == -normal);
         // On a plane face the point is the foot of p: what was projected may have been shifted, and forces
-        // at different points would turn the two endpoints against each other.
+        // at different points would turn the two sides against each other.
         let point = if flat { p - normal * gap } else { self.point };
         SurfacePoint { point, normal, gap, flat }
     }

@@ -17,7 +17,7 @@ pub(crate) struct SurfaceTree {
 const ROUNDING: f32 = 2.5e-7;
 
 impl SurfaceTree {
-    /// Takes in the facets on their way from `x` to `target`, with `margin` \[m\] around them.
+    /// Refits to the facets on their way from `x` to `target`, with `margin` \[m\] around them.
     pub fn update(&mut self, model: &DeformableModel, x: &[Vec3], target: &[Vec3], margin: f64) {
         self.boxes.clear();
         for facet in 0..model.surface.facet_count() {

@@ -49,7 +49,7 @@ fn is_same_place(a: &SoftSurface<'_>, b: &SoftSurface<'_>) -> bool {
 }
 
 /// As [`untangle`], of a body with itself. Other contacts between the same parts, of the constraints from `first` on, would
-/// hold them where they are.
+/// keep them where they are.
 pub(super) fn untangle_itself(
     own: &SoftSurface<'_>,
     pairs: &[(u32, u32)],
@@ -153,7 +153,7 @@ fn corners(s: &SoftSurface<'_>, t: u32) -> [Vec3; 3] {
     s.model.surface.triangles[t as usize].map(|n| s.x[n as usize])
 }
 
-/// Whether two triangles cut one another, each with corners clearly on both endpoints of the other's plane.
+/// Whether two triangles cut one another, each with corners clearly on both sides of the other's plane.
 fn go_through(a: &SoftSurface<'_>, ta: u32, b: &SoftSurface<'_>, tb: u32) -> bool {
     let (p, q) = (corners(a, ta), corners(b, tb));
     let clearly = CLEARLY * a.model.surface.mean_edge.min(b.model.surface.mean_edge);

@@ -1,4 +1,4 @@
-//! Rows inside soft triangles and on their edges, from the closest points of a triangle and an
+//! Contacts inside soft triangles and on their edges, from the closest points of a triangle and an
 //! obstacle: what nodes, face rims and corners miss, as a ball smaller than a triangle, or a sharp
 //! edge across one.
 //!

@@ -35,6 +35,6 @@ pub(super) fn coefficients(a: &ColliderMaterial, b: &ColliderMaterial) -> (f64, 
     let friction = combine(a.friction, b.friction, a.friction_combine_rule, b.friction_combine_rule);
     let restitution =
         combine(a.restitution, b.restitution, a.restitution_combine_rule, b.restitution_combine_rule);
-    // Beyond this no slope is left to slide on; infinity times zero would be no number.
+    // Beyond this no slope is left to slide on; infinity times zero would be NaN.
     (friction.clamp(0.0, 1e4), restitution.clamp(0.0, 1.0))
 }

@@ -1,6 +1,7 @@
 //! Rapier's sets, read into obstacles and rigid proxies, and the reactions written back.
 //!
-//! Architecture invariant: the only room that reads and writes rapier's sets; `pipeline` passes them on.
+//! Architecture invariant: the only room that writes to rapier's sets; `pipeline` passes them on, and asks them who
+//! moves and which groups collide.
 //! Everything below works on obstacles, proxies and constraints.
 
 mod parts;

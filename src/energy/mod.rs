@@ -113,7 +113,7 @@ pub(crate) trait ElementEnergy: Copy + Send + Sync {
     fn principal(&self, stretches: &Vec3) -> Principal;
 
     /// Weight w \[Pa\] of the element's Laplacian in the Projective Dynamics matrix
-    /// `M/h² + Σ w V GᵀG`: an upper bound of the energy's curvature.
+    /// `M/h² + Σ w V GᵀG`: as stiff as the energy is at rest, or nearly.
     fn laplacian_weight(&self) -> f64;
 }
 

@@ -119,7 +119,7 @@ fn polished(d: &Vec3, sigma: &Vec3) -> Vec3 {
     let across = inner * normal;
     let change = (normal.dot(&(inner * residual)) - (1.0 - product)) / normal.dot(&across);
     let next = d + inner * residual - across * change;
-    // Written so that a step that is no number is not taken.
+    // Written so that a NaN step is not taken.
     if (next - d).amax() < 1e-6 { next } else { *d }
 }
 

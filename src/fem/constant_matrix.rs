@@ -1,6 +1,6 @@
 //! The elastic part of the constant matrix [Bouaziz et al. 2014; Liu et al. 2017]: block by block, for the matrix that
 //! is put together, and as what it does to a vector, for the one that is not. Sheets, rods and springs
-//! are in it as the multiple of I that bounds them.
+//! are in it as a multiple of I that is about as stiff as they are along their lengths, without their strain limits.
 
 use super::gradients::{scatter_solid, solid_blocks, solid_gradient};
 use super::model::{DeformableModel, Elements};

@@ -1,4 +1,4 @@
-//! Rotations that follow a body: of the whole, and of its nodes.
+//! Rotations that follow a body: of the body, and of its nodes.
 
 use super::gradients::deformation_gradient;
 use super::model::DeformableModel;

@@ -42,7 +42,7 @@ impl DeformablePipeline {
     }
 
     /// Makes factors, and columns for contact anywhere on the surface, ahead of time; not for bodies that
-    /// hard attachments hold, whose matrix depends on what they are tied to.
+    /// hard attachments prescribe, whose matrix depends on what they are attached to.
     ///
     /// # Errors
     /// [`DeformableBodyError::TimeStep`].

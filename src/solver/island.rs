@@ -2,9 +2,9 @@
 //!
 //! Every iteration: `y = x + H(r + Jᵀλ⁰)` with the last forces λ⁰, the contact problem at y for λ,
 //! `x ← y + P Jᵀ(λ − λ⁰)`, and the guard. H is P, or its quasi-Newton update: at the fixed point
-//! λ = λ⁰ both ask for `r + Jᵀλ = 0`. If the guard finds the energy risen, the preconditioner is scaled
-//! (A → cA) and the iteration done again, contact problem included: shortening the step instead would
-//! break the contacts that were just solved.
+//! λ = λ⁰ both ask for `r + Jᵀλ = 0`. If the guard finds no sufficient decrease of `Ψ − λᵀJx`, the acceleration forgets
+//! its memory, then the preconditioner is damped (P → P/c, as by A → cA), and the iteration is done again, contact problem
+//! included: shortening the step instead would break the contacts that were just solved.
 
 use super::counters::SolveCounters;
 use crate::body::{Acceleration, Solver};
@@ -30,7 +30,7 @@ pub(crate) struct Island {
 enum Assembly {
     #[default]
     Done,
-    /// Frames or scalings are others.
+    /// Frames or dampings are others.
     Refreshed,
     /// The contacts are others.
     Anew,
@@ -111,7 +111,7 @@ impl Island {
         self.bodies.iter().for_each(|b| self.report.counters.add(&b.preconditioner.counters));
     }
 
-    /// Bodies whose step is far from solved and would gain energy give it up: where forces change wildly from iteration
+    /// Bodies whose step is far from solved and would gain energy are rejected: where forces change wildly from iteration
     /// to iteration, what they have done to a body is not what the last ones take from others.
     pub fn reject_steps_that_gain_energy(&mut self, context: &SolveContext<'_>) {
         loop {
@@ -131,7 +131,7 @@ impl Island {
         }
     }
 
-    /// Whether a body's step makes energy, with what its contacts make and `besides` \[J\]; not if it has given it up.
+    /// Whether a body's step makes energy, with what its contacts make and `besides` \[J\]; not if it was rejected.
     pub fn would_gain_energy(&mut self, index: usize, besides: f64, context: &SolveContext<'_>) -> bool {
         if self.bodies[index].is_rejected {
             return false;
@@ -140,7 +140,7 @@ impl Island {
         self.bodies[index].gains_energy(by_contacts.max(0.0) + besides)
     }
 
-    /// Takes the step of bodies that have given it up in their shapes, with contacts solved anew.
+    /// Moves bodies whose step was rejected as rigid ones, with contacts solved anew.
     pub fn step_rigid_fallbacks(&mut self, context: &SolveContext<'_>) {
         for index in 0..self.bodies.len() {
             if self.bodies[index].is_rejected {

@@ -83,7 +83,7 @@ fn solved_contacts_obey_signorini_and_coulomb() {
         let l = &contacts.lambda[3 * i..3 * i + 3];
         let gap = contacts.final_gap(i);
         // Lengths are of 1e-3 m over a step; the regularisation (ε = 1e-4) and the lagging shift of
-        // slipping rows leave less than 1e-4 of that.
+        // slipping contacts leave less than 1e-4 of that.
         assert!(
             gap > -1e-7 && l[0] >= 0.0 && l[1].hypot(l[2]) <= 0.4 * l[0] * (1.0 + 1e-9),
             "{gap:e} {l:?} after {} it.",

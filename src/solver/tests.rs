@@ -89,11 +89,11 @@ fn contact_set_elimination_is_the_surface_block_solve() {
     let dofs: Vec<usize> =
         contact.iter().flat_map(|&s| (0..3).map(move |c| 3 * surface.nodes[s] as usize + c)).collect();
     let b = DVector::from_fn(n, |i, _| ((i * 37 % 101) as f64 - 50.0) * 10.0);
-    let target_gap = DVector::from_fn(dofs.len(), |i, _| ((i * 13 % 17) as f64 - 8.0) * 1e-3);
+    let wanted = DVector::from_fn(dofs.len(), |i, _| ((i * 13 % 17) as f64 - 8.0) * 1e-3);
     // The partition, densely.
     let free: Vec<usize> = (0..n).filter(|i| !dofs.contains(i)).collect();
     let mut x = DVector::zeros(n);
-    dofs.iter().zip(target_gap.iter()).for_each(|(&i, g)| x[i] = *g);
+    dofs.iter().zip(wanted.iter()).for_each(|(&i, g)| x[i] = *g);
     let rhs = DVector::from_fn(free.len(), |i, _| b[free[i]] - A.row(free[i]).dot(&x.transpose()));
     let solved = A.select_rows(&free).select_columns(&free).cholesky().unwrap().solve(&rhs);
     free.iter().zip(solved.iter()).for_each(|(&i, v)| x[i] = *v);
@@ -104,7 +104,7 @@ fn contact_set_elimination_is_the_surface_block_solve() {
     });
     let solve = |v: &DVector<f64>| DVector::from_vec(solve_by(factor, v.as_slice()));
     let y = solve(&b);
-    let lambda = W.cholesky().unwrap().solve(&(target_gap - y.select_rows(&dofs)));
+    let lambda = W.cholesky().unwrap().solve(&(wanted - y.select_rows(&dofs)));
     let mut push = DVector::zeros(n);
     dofs.iter().zip(lambda.iter()).for_each(|(&i, l)| push[i] = *l);
     let twin = y + solve(&push);

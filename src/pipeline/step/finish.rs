@@ -106,7 +106,7 @@ pub(super) fn store(
     counters.not_converged += usize::from(!body.last_converged());
 }
 
-/// Gives attachments the forces with which they hold nodes of a body.
+/// Gives attachments the forces with which they lead nodes of a body.
 pub(super) fn give_forces(problem: &BodyProblem, deformables: &mut DeformableBodySet) {
     if problem.prescribed.is_empty() {
         return;

@@ -1,5 +1,5 @@
 //! Which bodies have to be solved together: those that touch the same yielding proxy, directly or
-//! through what ties or holds it.
+//! through attachments or the rigid neighbourhood.
 
 use super::work::{BodyWork, IslandWork};
 use crate::contact::{Constraint, Endpoint};
@@ -45,7 +45,7 @@ impl Grouping {
         }
         for constraint in links.drain(..) {
             let root = self.ends(&constraint, proxies).next().map(|p| self.root_of(p));
-            // RigidProxies that no body touches have an index beyond the bodies for their root.
+            // Proxies that no body touches have an index beyond the bodies for their root.
             if let Some(Some(place)) = root.and_then(|root| self.island_of_root.get(root)) {
                 islands[*place].add_shared(constraint);
             }

@@ -47,7 +47,7 @@ impl Sleeping {
         self.wake_listed(deformables);
     }
 
-    /// Wakes bodies that are tied to one that is awake, or fell asleep touching one that is not asleep any
+    /// Wakes bodies that are attached to one that is awake, or fell asleep touching one that is not asleep any
     /// more.
     pub fn wake_together(&mut self, deformables: &mut DeformableBodySet) {
         loop {
@@ -82,7 +82,7 @@ impl Sleeping {
     }
 
     /// Wakes whoever has a reason to: a changed attachment, anything around it that is not as it was when
-    /// it fell asleep, a tie to a body that is awake, a touching body that woke or went.
+    /// it fell asleep, an attachment to a body that is awake, a touching body that woke or went.
     pub fn wake(
         &mut self,
         deformables: &mut DeformableBodySet,

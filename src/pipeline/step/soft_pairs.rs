@@ -65,11 +65,11 @@ impl SoftPairDetection {
             pair.constraints.clear();
             pair.detector.detect(&pair.pair, [&a, &b], memory, &mut pair.constraints);
             // Between pinned nodes there is nothing to solve for.
-            let held = |endpoint: &Endpoint| match endpoint {
+            let is_pinned = |endpoint: &Endpoint| match endpoint {
                 Endpoint::Soft { body, .. } => work(*body).is_fully_pinned(endpoint),
                 Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => true,
             };
-            pair.constraints.retain(|constraint| !constraint.endpoints.iter().all(held));
+            pair.constraints.retain(|constraint| !constraint.endpoints.iter().all(is_pinned));
         });
         for pair in self.pairs[..self.count].iter().filter(|pair| !pair.constraints.is_empty()) {
             let sleeping = pair.ends.iter().filter_map(|end| end.checked_sub(works.len()));

@@ -1,6 +1,6 @@
 //! Obstacles kept free of what no contact keeps out.
 //!
-//! A body that is crushed to a film comes through its own surface; one that has given a step up goes on as a whole.
+//! A body that is crushed to a film comes through its own surface; one whose step was rejected goes on as a rigid one.
 //! What does not yield stops both, at the end of the step.
 
 use crate::body::{DeformableBody, DeformableState};
@@ -8,7 +8,7 @@ use crate::contact::{Constraint, Endpoint, Obstacle, Stop, comes_near, stop};
 use crate::math::Vec3;
 use crate::solver::BodyProblem;
 
-/// How far from an obstacle crossing nodes are stopped, in mean edges.
+/// How far from an obstacle tunnelling nodes are stopped, in mean edges.
 const CLEARANCE: f64 = 1.0e-3;
 /// Depth, in mean edges, at which a node of the surface without a contact counts as crossing.
 const MISSED: f64 = 0.05;
@@ -24,7 +24,7 @@ pub(super) struct TunnellingStops {
 }
 
 impl TunnellingStops {
-    /// Takes in the contacts of the body with obstacles.
+    /// Notes the contacts of the body with obstacles.
     pub fn begin(&mut self, constraints: &[Constraint]) {
         self.touching.clear();
         for constraint in constraints {
@@ -38,7 +38,7 @@ impl TunnellingStops {
     }
 
     /// Looks where the step has led nodes of a body into obstacles; of one that has given the step up and is not pinned,
-    /// where that lets it go as a whole. Returns the energy \[J\] that it takes to stop them.
+    /// shifted out as a rigid body. Returns the energy \[J\] that it takes to stop them.
     pub fn find<'a>(
         &mut self,
         problem: &mut BodyProblem,

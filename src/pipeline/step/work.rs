@@ -1,4 +1,5 @@
-//! What the pipeline keeps per body from step to step: memory only, nothing that results depend on.
+//! What the pipeline keeps per body from step to step: memory only. Results depend on none of it, but that a body put
+//! aside goes back to where its last step left it.
 
 use super::tunnelling::TunnellingStops;
 use crate::body::{
@@ -104,7 +105,7 @@ impl BodyWork {
         }
     }
 
-    /// Whether all nodes of a endpoint are pinned.
+    /// Whether all nodes of an endpoint are pinned.
     pub fn is_fully_pinned(&self, endpoint: &Endpoint) -> bool {
         let pins = self.problem.as_ref().map(|problem| &problem.key.pins);
         endpoint.soft_nodes().all(|(node, _)| pins.is_some_and(|p| p.binary_search(&(node as u32)).is_ok()))
@@ -135,7 +136,7 @@ impl BodyWork {
         }
     }
 
-    /// Puts a body whose state is no number back to where its last step left it.
+    /// Puts a body whose state is not finite back to where its last step left it.
     pub fn roll_back(&self, body: &mut DeformableBody) {
         let Some(problem) = self.problem.as_ref().filter(|p| p.model.id == body.model.id) else { return };
         if !problem.current.x.iter().all(is_number) {
@@ -196,7 +197,7 @@ impl BodyWork {
         self.constraints = constraints;
     }
 
-    /// Looks for obstacles that a body that touches nothing yet is about to detect_soft_pairs, and lists its surface
+    /// Looks for obstacles that a body that touches nothing yet is about to touch, and lists its surface
     /// nodes by their distance from those.
     pub fn look_ahead(&mut self, body: &DeformableBody, scene: &RapierScene, candidates: &Candidates) {
         self.ahead.clear();
@@ -323,7 +324,7 @@ impl IslandWork {
     /// What the contacts of a member leave to the next step, ascending by key.
     pub fn memory_of(&self, member: usize, h: f64, memory: &mut Vec<ConstraintMemory>) {
         memory.clear();
-        // What held a rigid shape says nothing of the next step.
+        // What pushed a rigid shape says nothing of the next step.
         if self.island.bodies[member].is_rejected {
             return;
         }

@@ -37,7 +37,7 @@ impl Accelerator {
         }
     }
 
-    /// Takes in the step from the current iterate to the trial.
+    /// Learns from the step from the current iterate to the trial.
     pub fn learn(&mut self, kind: Acceleration, body: &BodyProblem) {
         match kind {
             Acceleration::None => {}

@@ -61,7 +61,7 @@ impl Anderson {
         self.f = f;
     }
 
-    /// Takes in that the step is taken.
+    /// Notes that the step is accepted.
     pub fn learn(&mut self, window: usize, body: &BodyProblem) {
         if let Some(pair) = self.candidate.take() {
             if self.pairs.len() == window {

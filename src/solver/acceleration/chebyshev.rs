@@ -42,7 +42,7 @@ impl Chebyshev {
         }
     }
 
-    /// Takes in that the step is taken.
+    /// Notes that the step is accepted.
     pub fn learn(&mut self, body: &BodyProblem) {
         self.count += 1;
         self.omega = self.next_omega;

@@ -56,7 +56,7 @@ impl Lbfgs {
         body.set_trial(step);
     }
 
-    /// Takes in the step from the current iterate to the trial.
+    /// Learns from the step from the current iterate to the trial.
     pub fn learn(&mut self, body: &BodyProblem) {
         let mut pair = self.spare.pop().unwrap_or_default();
         difference(&body.trial.x, &body.current.x, &mut pair.moved);

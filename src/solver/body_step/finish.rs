@@ -10,7 +10,7 @@ const MAX_BALANCING_TURN: f64 = 0.1;
 const MAX_SPIN_GIVEN: f64 = 0.5;
 
 impl BodyProblem {
-    /// Moves and turns a body that nothing holds as a whole, so that its residual has neither force nor
+    /// Moves and turns a free body as a rigid one, so that its residual has neither force nor
     /// moment: what is left of it after a few iterations would set the body spinning. Deforms nothing.
     pub fn balance(&mut self) {
         let mobility = self.mobility();
@@ -30,7 +30,7 @@ impl BodyProblem {
         x.iter_mut().for_each(|x| *x = centre + shift + rotation * (*x - centre));
     }
 
-    /// Velocities at the end of the step [m/s]; `in_flight` tells that nothing touched or tied the body. Implicit
+    /// Velocities at the end of the step [m/s]; `in_flight` tells that nothing touched the body or was attached to it. Implicit
     /// Euler then loses angular momentum that nothing has taken: a rotation about the centre of mass puts
     /// it back.
     pub fn final_velocities(&self, in_flight: bool, v: &mut Vec<Vec3>) {
@@ -75,7 +75,7 @@ impl BodyProblem {
         left / self.key.pins.len().max(1) as f64
     }
 
-    /// Force \[N\] with which a pinned node is held; `share` is [`BodyProblem::pin_share`].
+    /// Force \[N\] with which a pinned node is kept; `share` is [`BodyProblem::pin_share`].
     pub fn pin_force(&self, node: u32, share: &Vec3) -> Vec3 {
         let Ok(k) = self.key.pins.binary_search(&node) else { return Vec3::zeros() };
         let node = node as usize;

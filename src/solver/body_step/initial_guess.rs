@@ -16,7 +16,7 @@ impl BodyProblem {
         let model = self.model.clone();
         let is_pinned = !self.key.pins.is_empty();
         if is_pinned {
-            // What is held does not fall: by its motion alone, so that what hangs still starts where it is.
+            // What is pinned does not fall: by its motion alone, so that what hangs still starts where it is.
             let drift = self.x_start.iter().zip(&self.v_start).map(|(x, v)| x + v * self.h);
             self.force.clear();
             self.force.extend(drift);

@@ -53,7 +53,7 @@ pub(crate) struct BodyProblem {
     /// Factor c ≥ 1 on A, raised by the guard.
     pub step_damping: f64,
     pub guard_retries: usize,
-    /// The step would have made energy: the body moves as a whole.
+    /// The step would have made energy: the body falls back to a rigid motion.
     pub is_rejected: bool,
     /// A force that counts as large for this body \[N\].
     pub weight: f64,
@@ -61,7 +61,7 @@ pub(crate) struct BodyProblem {
     pub(super) force: Vec<Vec3>,
     /// The body's frame at the start of the iteration.
     pub(super) frame: Mat3,
-    /// Nodes that attachments hold, ascending; pinned for the step.
+    /// Nodes that attachments prescribe, ascending; pinned for the step.
     pub prescribed: Vec<PrescribedNode>,
     /// Where the pinned nodes would go by inertia and external forces.
     pub(super) pinned_inertia: Vec<Vec3>,
@@ -84,7 +84,7 @@ pub(crate) struct Iterate {
 }
 
 impl BodyProblem {
-    /// Takes in a body at the start of a step of `h` \[s\] under `gravity` [m/s²], with what attachments hold of it.
+    /// Of a body at the start of a step of `h` \[s\] under `gravity` [m/s²], with the nodes that attachments prescribe.
     pub fn new(body: &DeformableBody, h: f64, gravity: &Vec3, prescribed: &[PrescribedNode]) -> Self {
         let n = body.state.x.len();
         let mut problem = Self {
@@ -204,7 +204,7 @@ impl BodyProblem {
         self.masses[node]
     }
 
-    /// Displacement per force over mass of the body as a whole, h²/(1 + αh) [s²].
+    /// Displacement per force over mass of a rigid body, h²/(1 + αh) [s²].
     pub(super) fn mobility(&self) -> f64 {
         self.h * self.h / (1.0 + self.material.mass_damping * self.h)
     }
@@ -301,7 +301,7 @@ impl BodyProblem {
         self.trial = iterate;
     }
 
-    /// Given up, with an infinite objective, where that would exceed `limit` \[J\].
+    /// Stopped, with an infinite objective, where that would exceed `limit` \[J\].
     pub(super) fn evaluate(&mut self, at: &mut Iterate, limit: f64) {
         at.r.clear();
         at.r.resize(at.x.len(), Vec3::zeros());

@@ -1,4 +1,4 @@
-//! Steps that would make energy out of nothing are given up: the body keeps its shape and moves as a rigid one, in
+//! Steps that would make energy out of nothing are rejected: the body keeps its shape and moves as a rigid one, in
 //! contact with what it touches. Between rigid bodies contacts only ever take energy.
 
 use super::problem::BodyProblem;
@@ -6,7 +6,7 @@ use crate::math::Vec3;
 use crate::solver::linear::SystemFactor;
 
 /// Share of a body's energy that a step of one iteration may make: such steps gain up to 3 % and lose it in the next
-/// ones. Those of n iterations a part in n² of it.
+/// ones. A body that may take n iterations (`max_iterations`, not those it took) may make the n-th part.
 const MAX_GAIN: f64 = 0.04;
 
 /// As [`MAX_GAIN`], of the work that contacts do on the body.
@@ -45,7 +45,7 @@ impl BodyProblem {
         let iterations = self.settings.max_iterations.max(1) as f64;
         let share = MAX_GAIN / iterations;
         let allowed = share * (before + kinetic) + MAX_GAIN_OF_WORK * by_contact.abs();
-        // Written so that what is not a number counts as gained.
+        // Written so that NaN counts as gained.
         !(gained + besides <= allowed)
     }
 
@@ -61,7 +61,7 @@ impl BodyProblem {
         gained
     }
 
-    /// Gives the step up: sets the trial to where the body goes in its shape under the present contact forces, from
+    /// Rejects the step: sets the trial to where the body goes in its shape under the present contact forces, from
     /// where it was at the start.
     pub fn begin_rigid_fallback(&mut self, factor: &SystemFactor) {
         self.current.x.clone_from(&self.x_start);

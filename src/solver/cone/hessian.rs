@@ -9,7 +9,7 @@ use crate::solver::linear::BlockFactor;
 /// Curvatures of all contacts and the factor they lead to.
 #[derive(Default)]
 pub(crate) struct ConeHessian {
-    /// ComplianceColumns of L per contact: their rows are those of the contact.
+    /// Columns of L per contact: their rows are those of the contact.
     columns: Vec<[[f64; 3]; 3]>,
     offsets: Vec<usize>,
     factor: BlockFactor,

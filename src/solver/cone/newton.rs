@@ -1,9 +1,13 @@
 //! The contact problem: forces λ in Coulomb cones that keep gaps open.
 //!
-//! `ĝ(λ) = g₀ + Wλ + (σ, 0, 0) − R(λ⁰ − λ)`, with σ = μ‖slip‖ the De Saxcé shift [De Saxcé & Feng
-//! 1998] and a proximal term around λ⁰, R = ε·max(W_nn, W_tt): at the fixed point λ = λ⁰ it cancels.
-//! With the projection γ(z) of −ĝ/R onto the cones, a globalised Newton method minimises the convex
-//! `f(z) = ½zᵀWz + ½γᵀRγ`, `∇f = W(z − γ)`, in the family of SAP [Castro et al. 2022].
+//! Solves `min over λ in K of ½λᵀWλ + gᵀλ + ½‖λ − λ⁰‖²_R`: W the Delassus operator [m/N], g the gaps and slips without
+//! contact forces \[m\], with the De Saxcé shift σ = μ‖slip‖ in the normal ones [De Saxcé & Feng 1998], R = ε·max(W_nn, W_tt)
+//! per constraint, K the product of cones, lines and segments. The proximal term cancels at the fixed point λ = λ⁰.
+//!
+//! Optimal is `λ = P(λ⁰ − (g + Wλ)/R)`, P the projection onto K. With `u(z) = λ⁰ − (g + Wz)/R` and `γ = P(u)` a globalised
+//! Newton method minimises the convex `f(z) = ½zᵀWz + Σ R·(½‖u‖² − ½‖u − γ‖²)`, `∇f = W(z − γ)`, in the family of SAP
+//! [Castro et al. 2022]. The sum is the Moreau potential [Moreau 1965], right for every convex K; on cones it is ½γᵀRγ, on
+//! the segment of a force-limited constraint it is not. Only f′ along a direction is ever evaluated. See `docs/method.md`.
 
 use super::hessian::ConeHessian;
 use super::problem::{ConeProblem, ConeTolerance, ConeWork, dot, largest, spatial};
@@ -14,18 +18,18 @@ use crate::contact::Law;
 const EPSILON: f64 = 1.0e-4;
 /// Error from which on Newton's method converges fast.
 const NEARLY: f64 = 1.0e-2;
-/// Newton steps that a warm start may take before the continuation is climbed.
+/// Newton steps that a warm start may take before continuation begins.
 const WARM_STEPS: usize = 4;
 /// Forces are left as they are at the start if they are no worse than the tolerance times this. A
 /// hundred times more, and a symmetric stack of 1000:1 begins to sway.
 const AS_GOOD: f64 = 100.0;
-/// Error of a warm start, after its apply_predictor, from which on the continuation is climbed at once.
+/// Error of a warm start, after the active-set predictor, from which on continuation begins at once.
 const TOO_FAR: f64 = 0.2;
 /// Accuracy of the stages below the last.
 const STAGE_TOLERANCE: f64 = 3.0e-3;
 /// Newton steps on a stage of the continuation.
 const STAGE_STEPS: usize = 40;
-/// Rungs tried when warm start and short continuation failed.
+/// Stages tried when warm start and short continuation failed.
 const FINE_STAGES: [f64; 7] = [1.0, 0.1, 1e-2, 3e-3, 1e-3, 3e-4, EPSILON];
 
 /// Solves cone problems; holds the memory for them.
@@ -282,7 +286,7 @@ impl ConeSolver {
         for i in 0..problem.contacts() {
             let rows = problem.offsets[i]..problem.offsets[i + 1];
             let stiffest = self.diagonal[rows].iter().copied().fold(0.0, f64::max);
-            // Rows that nothing yields to: any positive number keeps them harmless.
+            // Constraints that nothing yields to: any positive number keeps them harmless.
             self.R.push(epsilon * stiffest.max(f64::MIN_POSITIVE.sqrt()));
         }
     }

@@ -1,8 +1,8 @@
 //! The Coulomb friction cone `‖λ_t‖ ≤ μ λ_n`: projection of a force onto it, and its derivative.
 //!
-//! Rows that hold take part as intervals: a line without a limit, a segment with one.
+//! Bilateral constraints take part as intervals: a line without a limit, a segment with one.
 //!
-//! All of it is for a preconditioner that is the same in every direction of one contact, `R` [m/N]: then
+//! All of it is for a weight that is the same in every direction of one contact, `R` [m/N]: then
 //! the projection of u = −ĝ/R is closed [De Saxcé & Feng 1998; Castro et al. 2022].
 
 use crate::contact::Law;
@@ -50,7 +50,7 @@ pub(crate) fn project(u: [f64; 3], law: Law) -> Projected {
     Projected { force: [normal, scale * u[1], scale * u[2]], state: ConeState::Slip }
 }
 
-/// ComplianceColumns of `L` with `L Lᵀ = (1/R)·∂force/∂u` at `u`: the curvature of the contact, in `1/R`.
+/// Columns of `L` with `L Lᵀ = (1/R)·∂force/∂u` at `u`: the curvature of the contact, in `1/R`.
 /// Returns their number: none if open, one without friction, two if slipping, three if sticking.
 pub(crate) fn curvature_columns(u: [f64; 3], law: Law, R: f64, columns: &mut [[f64; 3]; 3]) -> usize {
     let projected = project(u, law);
@@ -78,7 +78,7 @@ pub(crate) fn curvature_columns(u: [f64; 3], law: Law, R: f64, columns: &mut [[f
 }
 
 /// What the projection near `u` is besides its derivative times the point: nothing on a cone, the limit
-/// of a row that holds no more.
+/// of a bilateral constraint that is at its limit.
 pub(crate) fn constant_part(u: [f64; 3], law: Law) -> f64 {
     match law {
         Law::Bilateral { limit } if u[0].abs() >= limit => limit.copysign(u[0]),

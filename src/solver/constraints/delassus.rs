@@ -188,7 +188,7 @@ impl JacobianColumn {
     }
 }
 
-/// What the jacobian act on.
+/// What the Jacobian columns act on.
 struct Between<'a> {
     bodies: &'a [BodyProblem],
     factors: Factors<'a>,

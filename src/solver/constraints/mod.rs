@@ -1,4 +1,4 @@
-//! The constraints of an island: rigid proxies, the Delassus operator, and the forces on both endpoints.
+//! The constraints of an island: rigid proxies, the Delassus operator, and the forces on both sides.
 
 mod rigid_proxy;
 

@@ -41,7 +41,7 @@ pub(crate) enum RigidProxy {
 pub(crate) struct Articulation {
     /// The links, by their slots.
     pub links: Vec<ProxyId>,
-    /// `J_a M⁻¹ J_bᵀ` between slots a and b, constraint by constraint: twist per wrench.
+    /// `J_a M⁻¹ J_bᵀ` between slots a and b, row by row: twist per wrench.
     pub blocks: Vec<Matrix6<f64>>,
 }
 
@@ -70,7 +70,7 @@ impl RigidProxy {
         }
     }
 
-    /// Force and moment about the centre of mass of a unit along `d` at a endpoint.
+    /// Force and moment about the centre of mass of a unit along `d` at an endpoint.
     pub fn wrench(&self, endpoint: &Endpoint, d: &Vec3) -> [Vec3; 2] {
         match endpoint {
             Endpoint::Rigid { point, .. } => [*d, (point - self.com()).cross(d)],
@@ -78,7 +78,7 @@ impl RigidProxy {
         }
     }
 
-    /// What a motion is at a endpoint: of its point, or its turn.
+    /// What a motion is at an endpoint: of its point, or its turn.
     fn at(&self, endpoint: &Endpoint, twist: &Twist) -> Vec3 {
         match endpoint {
             Endpoint::Rigid { point, .. } => twist.linear + twist.angular.cross(&(point - self.com())),
@@ -115,7 +115,7 @@ impl RigidProxies {
         &self.list[id.0 as usize]
     }
 
-    /// Takes in a proxy.
+    /// Adds a proxy.
     pub fn push(&mut self, proxy: RigidProxy) -> ProxyId {
         self.list.push(proxy);
         ProxyId(self.list.len() as u32 - 1)
@@ -134,7 +134,7 @@ impl RigidProxies {
         }
     }
 
-    /// How far a endpoint moves over a step of `h` \[s\] under reactions \[m, rad\]; zero for a soft one.
+    /// How far an endpoint moves over a step of `h` \[s\] under reactions \[m, rad\]; zero for a soft one.
     pub fn displacement(&self, endpoint: &Endpoint, reactions: &[Reaction], h: f64) -> Vec3 {
         let Some(id) = endpoint.proxy() else { return Vec3::zeros() };
         let proxy = self.get(id);
@@ -164,7 +164,7 @@ impl RigidProxies {
         }
     }
 
-    /// Velocity of a endpoint at the start of the step [m/s, rad/s].
+    /// Velocity of an endpoint at the start of the step [m/s, rad/s].
     pub fn velocity(&self, endpoint: &Endpoint, h: f64) -> Vec3 {
         let Some(id) = endpoint.proxy() else { return Vec3::zeros() };
         let proxy = self.get(id);
@@ -199,7 +199,7 @@ impl RigidProxies {
         moved.at(at, &twist)
     }
 
-    /// Adds a force \[N\] (or moment \[N m\]) that acts over a step at a endpoint.
+    /// Adds a force \[N\] (or moment \[N m\]) that acts over a step at an endpoint.
     pub fn add_reaction(&self, endpoint: &Endpoint, force: &Vec3, h: f64, reactions: &mut [Reaction]) {
         let Some(id) = endpoint.proxy() else { return };
         let proxy = self.get(id);

@@ -1,8 +1,8 @@
-//! The contacts of an island as a cone problem: gaps, warm starts, goals, and the forces on both endpoints.
+//! The contacts of an island as a cone problem: gaps, warm starts, target gaps, and the forces on both sides.
 //!
 //! Directions stay fixed within a step, and W unless a body's frame or step_damping changes; gaps are taken
 //! anew in every iteration. Detection finds whatever might touch within the step; the problem holds what
-//! carried in the last one or is about to close, and takes in what is found to close when it does.
+//! carried in the last one or is about to close, and activates what is found to close when it does.
 
 use super::context::SolveContext;
 use super::delassus::{ContactRows, Delassus, steady_geometry};
@@ -41,7 +41,7 @@ pub(crate) struct ContactSystem {
 
 /// Compliance [m/N] of contacts of a body that keeps its shape with itself: any positive number.
 const WITHIN_A_SHAPE: f64 = 1.0e-6;
-/// Solves with a fresh shift per global iteration.
+/// Solves with a fresh shift per contact problem, of which an iteration has up to four.
 const SHIFT_ROUNDS: usize = 2;
 
 impl ContactSystem {
@@ -54,8 +54,8 @@ impl ContactSystem {
         self.active
     }
 
-    /// Packs the constraints for a step of `h` \[s\] that carried in the last one, or hold, with their warm
-    /// starts, which are laid on the nodes.
+    /// Packs the constraints for a step of `h` \[s\] that carried in the last one, or are shared, with their warm
+    /// starts, which are scattered to the nodes.
     pub fn begin(&mut self, bodies: &mut [BodyProblem], context: &SolveContext<'_>) {
         for constraint in &mut self.constraints {
             constraint.target_gap = target_gap(constraint, bodies, context);
@@ -225,7 +225,7 @@ impl ContactSystem {
         }
     }
 
-    /// What the contacts of a body have put into all that they touch \[J\]: work on both of their endpoints, with the bodies
+    /// What the contacts of a body have put into all that they touch \[J\]: work on both of their sides, with the bodies
     /// at their current positions. Closing contacts and friction take some.
     pub fn made_energy(&mut self, index: usize, bodies: &[BodyProblem], context: &SolveContext<'_>) -> f64 {
         let reactions = self.collect_reactions(context);

@@ -1,4 +1,4 @@
-//! ComplianceColumns of `A⁻¹` over the surface nodes, made when a node first comes near a contact.
+//! Columns of `A⁻¹` over the surface nodes, made when a node first comes near a contact.
 //!
 //! Of each column only the rows of surface nodes are kept. Blocks are in the rest frame; frames
 //! rotate them.

@@ -109,10 +109,10 @@ impl StiffnessOperator {
         };
         precondition(r, z);
         p.clone_from(z);
-        let target_gap = TOLERANCE * dot(r, r).sqrt();
+        let wanted = TOLERANCE * dot(r, r).sqrt();
         let mut before = dot(r, z);
         for _ in 0..MAX_STEPS {
-            if !(dot(r, r).sqrt() > target_gap) {
+            if !(dot(r, r).sqrt() > wanted) {
                 break;
             }
             self.multiply(p, Ap);

@@ -157,7 +157,7 @@ struct Panel<'a, T, const D: usize> {
 }
 
 impl<'a, T: Entry, const D: usize> Panel<'a, T, D> {
-    /// ComplianceColumns from the last to the first: what a node becomes no earlier column needs.
+    /// Columns from the last to the first: what a node becomes no earlier column needs.
     #[inline(always)]
     fn forward(&self, x: &mut [Lane]) {
         let mut at = 0;
@@ -203,7 +203,7 @@ impl<'a, T: Entry, const D: usize> Panel<'a, T, D> {
         at
     }
 
-    /// ComplianceColumns from the first to the last: none needs an earlier node.
+    /// Columns from the first to the last: none needs an earlier node.
     #[inline(always)]
     fn backward(&self, x: &mut [Lane]) {
         let mut end = self.values.len() - PADDING;
