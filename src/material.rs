@@ -55,6 +55,7 @@ pub struct DeformableMaterial {
 impl DeformableMaterial {
     /// A material of Young's modulus `youngs_modulus` \[Pa\] and Poisson's ratio `poisson_ratio`; the
     /// density is that of water, friction 0.5, no restitution and no damping.
+    #[must_use]
     pub fn new(youngs_modulus: f64, poisson_ratio: f64) -> Self {
         Self {
             youngs_modulus,
@@ -71,36 +72,42 @@ impl DeformableMaterial {
     }
 
     /// Sets the density [kg/m³].
+    #[must_use]
     pub fn density(mut self, density: f64) -> Self {
         self.density = density;
         self
     }
 
     /// Sets the coefficient of friction.
+    #[must_use]
     pub fn friction(mut self, friction: f64) -> Self {
         self.friction = friction;
         self
     }
 
     /// Sets the coefficient of restitution.
+    #[must_use]
     pub fn restitution(mut self, restitution: f64) -> Self {
         self.restitution = restitution;
         self
     }
 
     /// Sets the mass-proportional damping α [1/s].
+    #[must_use]
     pub fn mass_damping(mut self, alpha: f64) -> Self {
         self.mass_damping = alpha;
         self
     }
 
     /// Sets the stiffness-proportional damping β \[s\].
+    #[must_use]
     pub fn stiffness_damping(mut self, beta: f64) -> Self {
         self.stiffness_damping = beta;
         self
     }
 
     /// Sets the elastic energy.
+    #[must_use]
     pub fn elasticity(mut self, elasticity: Elasticity) -> Self {
         self.elasticity = elasticity;
         self
@@ -108,12 +115,14 @@ impl DeformableMaterial {
 
     /// Limits the principal stretches, below and above one: cloth that gives way easily up to some
     /// per cent and hardly any more.
+    #[must_use]
     pub fn strain_limits(mut self, least: f64, largest: f64) -> Self {
         self.strain_limits = Some([least, largest]);
         self
     }
 
     /// Sets Young's modulus of muscle fibres \[Pa\].
+    #[must_use]
     pub fn fibre_modulus(mut self, fibre_modulus: f64) -> Self {
         self.fibre_modulus = fibre_modulus;
         self

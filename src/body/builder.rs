@@ -10,6 +10,7 @@ use parry3d::shape::Shape;
 use rapier3d::dynamics::CoefficientCombineRule;
 use rapier3d::geometry::InteractionGroups;
 use rapier3d::math::{Pose, Rotation, Vector};
+use std::fmt;
 use std::sync::Arc;
 
 /// Builds a [`DeformableBody`]. Errors of the mesh are kept until [`DeformableBodyBuilder::build`],
@@ -47,6 +48,20 @@ pub struct DeformableBodyBuilder {
 }
 
 type Condition = Arc<dyn Fn(Vector) -> bool + Send + Sync>;
+
+/// The mesh would fill pages, and the condition of pins cannot be printed: the number of vertices, and whether there
+/// is one.
+impl fmt::Debug for DeformableBodyBuilder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("DeformableBodyBuilder")
+            .field("vertices", &self.model.as_ref().map(|model| model.vertex_count()))
+            .field("material", &self.material)
+            .field("settings", &self.settings)
+            .field("pose", &self.pose)
+            .field("pinned", &self.pinned.is_some())
+            .finish_non_exhaustive()
+    }
+}
 
 impl DeformableBodyBuilder {
     /// A cuboid of these half extents \[m\], cut into cells of five tetrahedra each.

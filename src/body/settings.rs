@@ -203,6 +203,7 @@ impl Default for SolverSettings {
 
 impl SolverSettings {
     /// Exactly this many iterations, unless nothing but rounding is left before.
+    #[must_use]
     pub fn iterations(count: usize) -> Self {
         Self { max_iterations: count, tolerance: 0.0, ..Self::default() }
     }

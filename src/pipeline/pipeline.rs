@@ -7,6 +7,7 @@ use crate::body::{DeformableBodySet, Integrator};
 use crate::coupling::PhysicsParts;
 use crate::error::DeformableBodyError;
 use crate::solver::{FactorKey, SECOND_ORDER};
+use std::fmt;
 
 /// Steps deformable bodies beside rapier: for games with their own loop and sets. Holds memory and
 /// caches only: a fresh pipeline goes on with the same bits.
@@ -16,6 +17,13 @@ use crate::solver::{FactorKey, SECOND_ORDER};
 #[derive(Default)]
 pub struct DeformablePipeline {
     scratch: StepScratch,
+}
+
+/// Caches would fill pages: what the last step did instead.
+impl fmt::Debug for DeformablePipeline {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("DeformablePipeline").field("counters", self.counters()).finish_non_exhaustive()
+    }
 }
 
 impl DeformablePipeline {

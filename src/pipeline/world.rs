@@ -28,7 +28,7 @@ use rapier3d::pipeline::{EventHandler, PhysicsHooks, PhysicsWorld};
 /// assert!((carried.y - 64.0 * 9.81).abs() < 0.1);
 /// # Ok::<(), DeformableBodyError>(())
 /// ```
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct DeformableWorld {
     /// The bodies.
     pub bodies: DeformableBodySet,
