@@ -6,6 +6,7 @@ use thiserror::Error;
 
 /// What is wrong with a material.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
 #[error("material: {quantity} is {value}, but must be {range}")]
 pub struct MaterialError {
     /// The quantity that is out of range.
@@ -28,6 +29,7 @@ pub struct MaterialError {
 /// assert!(DeformableMaterial::new(5.0e4, 0.5).validate().is_err());
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct DeformableMaterial {
     /// Young's modulus \[Pa\].
     pub youngs_modulus: f64,
@@ -69,6 +71,20 @@ impl DeformableMaterial {
             strain_limits: None,
             fibre_modulus: 0.0,
         }
+    }
+
+    /// Sets Young's modulus \[Pa\].
+    #[must_use]
+    pub fn youngs_modulus(mut self, youngs_modulus: f64) -> Self {
+        self.youngs_modulus = youngs_modulus;
+        self
+    }
+
+    /// Sets Poisson's ratio.
+    #[must_use]
+    pub fn poisson_ratio(mut self, poisson_ratio: f64) -> Self {
+        self.poisson_ratio = poisson_ratio;
+        self
     }
 
     /// Sets the density [kg/m³].

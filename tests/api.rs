@@ -53,7 +53,8 @@ fn every_type_of_the_surface_is_promised_to_be_thread_safe() {
     let exported: Vec<&str> =
         surface.split("\npub use ").skip(1).flat_map(|line| types(line.split(';').next().unwrap())).collect();
     assert!(exported.contains(&"DeformableWorld") && exported.contains(&"MeshError"));
-    let promises = include_str!("api.rs").split("is_thread_safe: ").nth(1).unwrap().split(';').next().unwrap();
+    let promises =
+        include_str!("api.rs").split("is_thread_safe: ").nth(1).unwrap().split(';').next().unwrap();
     let promised: Vec<&str> = types(promises).collect();
     let missing: Vec<_> = exported.iter().filter(|name| !promised.contains(name)).collect();
     assert!(missing.is_empty(), "{missing:?}");
