@@ -229,6 +229,8 @@ struct Report {
 }
 
 impl Report {
+    // An argument per column.
+    #[allow(clippy::too_many_arguments)]
     fn row(
         &mut self,
         scene: &str,
