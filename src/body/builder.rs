@@ -70,7 +70,7 @@ impl DeformableBodyBuilder {
     }
 
     /// A sheet in the plane of x and z, of these half extents \[m\] and of `thickness` \[m\], cut into triangles as
-    /// [`Structure::rectangle`] says. Its solver is given the [`Laplacian`](super::SystemMatrix::Laplacian); see
+    /// [`Structure::rectangle`] says. Its solver is given the [`Laplacian`](crate::SystemMatrix::Laplacian); see
     /// [`Solver::Newton`](super::Solver::Newton) for stiff ones.
     ///
     /// ```
