@@ -36,16 +36,10 @@ fn run(e: f64, nu: f64, settings: SolverSettings) -> (Vec<f64>, f64) {
 }
 
 fn main() {
-    let plain = |iterations| SolverSettings {
-        acceleration: Acceleration::None,
-        ..SolverSettings::iterations(iterations)
-    };
+    let plain = |iterations| SolverSettings::iterations(iterations).acceleration(Acceleration::None);
     let lbfgs = SolverSettings::iterations;
-    let laplacian = |iterations| SolverSettings {
-        system: SystemMatrix::Laplacian,
-        ..SolverSettings::iterations(iterations)
-    };
-    let tolerance = |tolerance| SolverSettings { tolerance, ..SolverSettings::default() };
+    let laplacian = |iterations| SolverSettings::iterations(iterations).system(SystemMatrix::Laplacian);
+    let tolerance = |tolerance| SolverSettings::default().tolerance(tolerance);
     // With the errors that the README states.
     let settings = [
         ("plain, 1", plain(1), [0.1473, 0.1851, 0.5399, 0.1183]),
@@ -68,7 +62,7 @@ fn main() {
         "tip error [m] (ms)", "E 3e5, ν 0.3", "E 1e6, ν 0.3", "E 1e6, ν 0.45", "E 3e6, ν 0.3"
     );
     let cases = [(3e5, 0.3), (1e6, 0.3), (1e6, 0.45), (3e6, 0.3)];
-    let truth = SolverSettings { max_iterations: 300, tolerance: 1e-9, ..SolverSettings::default() };
+    let truth = SolverSettings::default().max_iterations(300).tolerance(1e-9);
     let truths = cases.map(|(e, nu)| run(e, nu, truth).0);
     for (name, settings, stated) in settings {
         print!("{name:<16}");

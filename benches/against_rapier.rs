@@ -229,6 +229,8 @@ struct Report {
 }
 
 impl Report {
+    // An argument per column.
+    #[allow(clippy::too_many_arguments)]
     fn row(
         &mut self,
         scene: &str,
@@ -286,7 +288,7 @@ fn static_tip(item: &Item) -> f64 {
     let builder = DeformableBodyBuilder::mesh(&item.mesh())
         .can_sleep(false)
         .material(DeformableMaterial::new(item.e, item.nu).mass_damping(5.0))
-        .settings(SolverSettings { max_iterations: 100, tolerance: 1e-8, ..SolverSettings::default() })
+        .settings(SolverSettings::default().max_iterations(100).tolerance(1e-8))
         .pinned(|x| x.x < -0.4999);
     let body = world.insert(builder).expect("a valid beam");
     (0..150).for_each(|_| world.step(&mut physics));

@@ -66,7 +66,7 @@ fn energies() {
 fn beam(cells: [usize; 3], precision: FactorPrecision) {
     let mut physics = PhysicsWorld::new();
     let mut world = DeformableWorld::new();
-    let settings = SolverSettings { precision, ..SolverSettings::default() };
+    let settings = SolverSettings::default().precision(precision);
     let builder = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.1, 0.1), cells)
         .can_sleep(false)
         .material(DeformableMaterial::new(1e6, 0.3).mass_damping(5.0))

@@ -84,7 +84,7 @@ mod pipeline;
 pub use body::{
     Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
     DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableState, FactorPrecision,
-    Fidelity, Frames, Integrator, JointRole, Pin, Solver, SolverSettings,
+    Fidelity, Frames, Integrator, JointRole, Solver, SolverSettings,
 };
 pub use contact::DeformableSurfacePoint;
 pub use coupling::PhysicsParts;

@@ -6,6 +6,7 @@ use thiserror::Error;
 
 /// What is wrong with a material.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
 #[error("material: {quantity} is {value}, but must be {range}")]
 pub struct MaterialError {
     /// The quantity that is out of range.
@@ -28,6 +29,7 @@ pub struct MaterialError {
 /// assert!(DeformableMaterial::new(5.0e4, 0.5).validate().is_err());
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct DeformableMaterial {
     /// Young's modulus \[Pa\].
     pub youngs_modulus: f64,
@@ -55,6 +57,7 @@ pub struct DeformableMaterial {
 impl DeformableMaterial {
     /// A material of Young's modulus `youngs_modulus` \[Pa\] and Poisson's ratio `poisson_ratio`; the
     /// density is that of water, friction 0.5, no restitution and no damping.
+    #[must_use]
     pub fn new(youngs_modulus: f64, poisson_ratio: f64) -> Self {
         Self {
             youngs_modulus,
@@ -70,37 +73,57 @@ impl DeformableMaterial {
         }
     }
 
+    /// Sets Young's modulus \[Pa\].
+    #[must_use]
+    pub fn youngs_modulus(mut self, youngs_modulus: f64) -> Self {
+        self.youngs_modulus = youngs_modulus;
+        self
+    }
+
+    /// Sets Poisson's ratio.
+    #[must_use]
+    pub fn poisson_ratio(mut self, poisson_ratio: f64) -> Self {
+        self.poisson_ratio = poisson_ratio;
+        self
+    }
+
     /// Sets the density [kg/m³].
+    #[must_use]
     pub fn density(mut self, density: f64) -> Self {
         self.density = density;
         self
     }
 
     /// Sets the coefficient of friction.
+    #[must_use]
     pub fn friction(mut self, friction: f64) -> Self {
         self.friction = friction;
         self
     }
 
     /// Sets the coefficient of restitution.
+    #[must_use]
     pub fn restitution(mut self, restitution: f64) -> Self {
         self.restitution = restitution;
         self
     }
 
     /// Sets the mass-proportional damping α [1/s].
+    #[must_use]
     pub fn mass_damping(mut self, alpha: f64) -> Self {
         self.mass_damping = alpha;
         self
     }
 
     /// Sets the stiffness-proportional damping β \[s\].
+    #[must_use]
     pub fn stiffness_damping(mut self, beta: f64) -> Self {
         self.stiffness_damping = beta;
         self
     }
 
     /// Sets the elastic energy.
+    #[must_use]
     pub fn elasticity(mut self, elasticity: Elasticity) -> Self {
         self.elasticity = elasticity;
         self
@@ -108,12 +131,14 @@ impl DeformableMaterial {
 
     /// Limits the principal stretches, below and above one: cloth that gives way easily up to some
     /// per cent and hardly any more.
+    #[must_use]
     pub fn strain_limits(mut self, least: f64, largest: f64) -> Self {
         self.strain_limits = Some([least, largest]);
         self
     }
 
     /// Sets Young's modulus of muscle fibres \[Pa\].
+    #[must_use]
     pub fn fibre_modulus(mut self, fibre_modulus: f64) -> Self {
         self.fibre_modulus = fibre_modulus;
         self

@@ -110,7 +110,7 @@ fn heap() -> (PhysicsWorld, DeformableWorld) {
     for (k, system) in [SystemMatrix::RestStiffness, SystemMatrix::Laplacian].into_iter().enumerate() {
         let at = Vector::new(2.0 + k as f32, 3.0, 0.0);
         let body = DeformableBodyBuilder::cuboid(Vector::new(0.2, 0.05, 0.05), [6, 2, 2]).translation(at);
-        let settings = SolverSettings { integrator: Integrator::Bdf2, system, ..SolverSettings::default() };
+        let settings = SolverSettings::default().integrator(Integrator::Bdf2).system(system);
         world.insert(body.angvel(Vector::new(3.0, 1.0, 2.0)).settings(settings)).unwrap();
     }
     (physics, world)

@@ -31,7 +31,7 @@ fn spinning_body_keeps_its_shape_and_its_centre() {
     physics.gravity = Vector::ZERO;
     let mut world = DeformableWorld::new();
     // Implicit Euler by itself.
-    let settings = SolverSettings { keeps_spin: false, ..SolverSettings::default() };
+    let settings = SolverSettings::default().keeps_spin(false);
     let spinning = cube(DeformableMaterial::new(1e8, 0.3), 0.0).angvel(Vector::new(0.0, 5.0, 0.0));
     let body = world.insert(spinning.settings(settings)).unwrap();
     let (centre, momentum) = (world.bodies[body].center_of_mass(), world.bodies[body].angular_momentum()[1]);

@@ -67,11 +67,8 @@ fn slender(e: f64, settings: SolverSettings) -> DeformableBodyBuilder {
 
 #[test]
 fn clusters_take_most_of_the_laplacians_error_at_three_iterations() {
-    let laplacian = |clusters| SolverSettings {
-        system: SystemMatrix::Laplacian,
-        clusters,
-        ..SolverSettings::iterations(3)
-    };
+    let laplacian =
+        |clusters| SolverSettings::iterations(3).system(SystemMatrix::Laplacian).clusters(clusters);
     let truth = tip_path(slender(1e6, converged()), 90);
     let [without, with] = [0, 8].map(|n| errors(&tip_path(slender(1e6, laplacian(n)), 90), &truth)[0]);
     println!("three iterations of the Laplacian: {without:.3} off, with eight clusters {with:.4}");
@@ -114,7 +111,7 @@ fn laplacian_has_a_ninth_of_the_factor() {
         let mut physics = PhysicsWorld::new();
         let mut world = DeformableWorld::new();
         let beam = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.1, 0.1), [32, 5, 5]);
-        let settings = SolverSettings { system, ..SolverSettings::default() };
+        let settings = SolverSettings::default().system(system);
         world.insert(beam.settings(settings).pinned(|x| x.x < -0.4999)).unwrap();
         world.step(&mut physics);
         world.counters().factor_bytes as f64
@@ -131,8 +128,7 @@ const INTEGRATORS: [Integrator; 2] = [Integrator::ImplicitEuler, Integrator::Bdf
 fn second_order_has_an_eighth_of_the_error_at_a_sixtieth_of_a_second() {
     // At the times of the coarsest step, as the table has them.
     let path = |integrator, per_second: usize| -> Vec<[f64; 3]> {
-        let settings =
-            SolverSettings { integrator, max_iterations: 50, tolerance: 1e-6, ..SolverSettings::default() };
+        let settings = SolverSettings::default().integrator(integrator).max_iterations(50).tolerance(1e-6);
         let path = tip_path_at(beam(0.0).settings(settings), per_second, 3 * per_second / 2);
         path.into_iter().step_by(per_second / 30).collect()
     };
@@ -155,8 +151,7 @@ fn second_order_has_an_eighth_of_the_error_at_a_sixtieth_of_a_second() {
 /// Frequency of the first mode, and what is left of its swing after a period, of a stiff slender beam let go under its
 /// own weight.
 fn first_mode(integrator: Integrator, per_second: usize) -> [f64; 2] {
-    let settings =
-        SolverSettings { integrator, tolerance: 1e-8, max_iterations: 50, ..SolverSettings::default() };
+    let settings = SolverSettings::default().integrator(integrator).tolerance(1e-8).max_iterations(50);
     let path = tip_path_at(slender(1e8, settings), per_second, per_second * 9 / 20);
     let height: Vec<f64> = path[1..].iter().map(|p| p[1]).collect();
     // Turning points by parabolas through three heights: lowest, highest, lowest again.

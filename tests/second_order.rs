@@ -5,7 +5,7 @@ use foible3d::prelude::*;
 use rapier3d::prelude::*;
 
 fn settings(integrator: Integrator) -> SolverSettings {
-    SolverSettings { integrator, max_iterations: 50, tolerance: 1e-8, ..SolverSettings::default() }
+    SolverSettings::default().integrator(integrator).max_iterations(50).tolerance(1e-8)
 }
 
 /// Tip of a bar (0.5 m) that swings under its own weight, 0.4 s after it was let go.
@@ -79,10 +79,7 @@ fn bent_bars_never_gain_energy() {
             let mut world = DeformableWorld::new();
             let bar = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.05, 0.05), [20, 2, 2])
                 .material(DeformableMaterial::new(e, 0.3))
-                .settings(SolverSettings {
-                    integrator: Integrator::Bdf2,
-                    ..SolverSettings::iterations(iterations)
-                })
+                .settings(SolverSettings::iterations(iterations).integrator(Integrator::Bdf2))
                 .can_sleep(false);
             let bar = world.insert(bar).unwrap();
             let body = &mut world.bodies[bar];

@@ -4,19 +4,14 @@ use foible3d::prelude::*;
 use rapier3d::prelude::*;
 
 fn newton() -> SolverSettings {
-    SolverSettings {
-        solver: Solver::Newton,
-        max_iterations: 60,
-        tolerance: 1e-12,
-        ..SolverSettings::default()
-    }
+    SolverSettings::default().solver(Solver::Newton).max_iterations(60).tolerance(1e-12)
 }
 
 const SOLVERS: [Solver; 4] =
     [Solver::Projective, Solver::ConjugateGradients, Solver::GaussSeidel, Solver::Jacobi];
 
 fn laplacian(solver: Solver, iterations: usize) -> SolverSettings {
-    SolverSettings { solver, system: SystemMatrix::Laplacian, ..SolverSettings::iterations(iterations) }
+    SolverSettings::iterations(iterations).solver(solver).system(SystemMatrix::Laplacian)
 }
 
 /// A body of one kind, held at one end, and its first step from a stretched and bent state.
@@ -70,7 +65,7 @@ fn every_acceleration_comes_to_the_same_and_sooner_than_none() {
         let mut plain = 0.0;
         for acceleration in accelerations {
             let error = |n| {
-                let settings = SolverSettings { acceleration, ..laplacian(solver, n) };
+                let settings = laplacian(solver, n).acceleration(acceleration);
                 distance(&one_step(builder, settings), &truth)
             };
             let errors = counts.map(error);
@@ -91,7 +86,7 @@ fn every_solver_rests_on_the_floor_with_its_weight_under_a_box() {
         for system in [SystemMatrix::RestStiffness, SystemMatrix::Laplacian] {
             let (mut physics, floor) = common::world_with_floor(1.0 / 60.0);
             let mut world = DeformableWorld::new();
-            let settings = SolverSettings { solver, system, ..SolverSettings::default() };
+            let settings = SolverSettings::default().solver(solver).system(system);
             let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [4; 3])
                 .translation(Vector::Y * 0.25)
                 .material(DeformableMaterial::new(3e5, 0.3).mass_damping(1.0))
@@ -131,12 +126,7 @@ fn every_solver_holds_a_box_by_an_attachment() {
         let mut world = DeformableWorld::new();
         let beam = DeformableBodyBuilder::cuboid(Vector::new(0.3, 0.1, 0.1), [6, 2, 2])
             .material(DeformableMaterial::new(3e5, 0.3).mass_damping(5.0))
-            .settings(SolverSettings {
-                solver,
-                max_iterations: 300,
-                tolerance: 1e-5,
-                ..SolverSettings::default()
-            })
+            .settings(SolverSettings::default().solver(solver).max_iterations(300).tolerance(1e-5))
             .pinned(|x| x.x < -0.299)
             .can_sleep(false);
         let beam = world.insert(beam).unwrap();

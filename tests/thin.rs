@@ -72,7 +72,7 @@ fn stiff_rope_does_not_stretch_under_a_thousand_times_its_weight() {
     // Hung by its end, a thousand times its weight on the other. Steel, 2 mm: E A = 6e5 N.
     for iterations in [1, 3, 10] {
         let material = DeformableMaterial::new(2e11, 0.3).density(7800.0).mass_damping(2.0);
-        let settings = SolverSettings { solver: Solver::Newton, ..SolverSettings::iterations(iterations) };
+        let settings = SolverSettings::iterations(iterations).solver(Solver::Newton);
         let points = straight(50, 1.0);
         let rope = DeformableBodyBuilder::rope(&points, 1e-3).material(material).settings(settings);
         let mut world = DeformableWorld::new();
@@ -128,7 +128,7 @@ fn rods_and_sheets_bend_as_beams_do() {
     // The last one's triangles are higher than equilateral ones by 15 %.
     let strips = [(0.0217, [40, 4]), (0.065, [40, 12]), (0.0325, [80, 12]), (0.025, [40, 4])];
     for (half_width, cells) in strips {
-        let newton = SolverSettings { solver: Solver::Newton, ..SolverSettings::default() };
+        let newton = SolverSettings::default().solver(Solver::Newton);
         let strip = DeformableBodyBuilder::cloth([0.25, half_width], cells, thickness);
         let strip = strip.material(material).settings(newton);
         let clamped = if cells[0] == 40 { 0.0126 } else { 0.0063 };
@@ -152,12 +152,7 @@ fn hanging_cloth_has_the_shape_that_newtons_method_finds() {
             .material(cotton)
             .pinned(|x| x.x.abs() > 0.499 && x.z < -0.499)
     };
-    let newton = SolverSettings {
-        solver: Solver::Newton,
-        tolerance: 1e-8,
-        max_iterations: 50,
-        ..SolverSettings::default()
-    };
+    let newton = SolverSettings::default().solver(Solver::Newton).tolerance(1e-8).max_iterations(50);
     let shape = |builder: DeformableBodyBuilder| {
         let (world, body) = settle(builder, 1.0 / 60.0, 8.0);
         positions(&world.bodies[body])
@@ -196,10 +191,10 @@ fn network_of_springs_is_about_as_stiff_as_the_solid_it_stands_for() {
 #[test]
 fn sheet_pulled_along_its_length_has_youngs_modulus_and_poissons_ratio() {
     let (e, nu, thickness) = (1e6, 0.4, 1e-2);
-    let settings = SolverSettings { tolerance: 1e-6, max_iterations: 50, ..SolverSettings::default() };
+    let settings = SolverSettings::default().tolerance(1e-6).max_iterations(50);
     let sheet = DeformableBodyBuilder::cloth([0.5, 0.1], [20, 4], thickness)
         .material(DeformableMaterial::new(e, nu).mass_damping(20.0))
-        .settings(SolverSettings { system: SystemMatrix::Laplacian, ..settings })
+        .settings(settings.system(SystemMatrix::Laplacian))
         .gravity_scale(0.0)
         .can_sleep(false);
     let mut world = DeformableWorld::new();

@@ -177,8 +177,7 @@ fn mode_table() {
         scene.kind = Kind::Bar { half: [0.5, 0.05, 0.05], cells: [20, 2, 2], twist: 0.0, pull: 0.0 };
         scene.dt = 1.0 / per_second as f32;
         scene.steps = 2 * per_second;
-        let settings =
-            SolverSettings { integrator, tolerance: 1e-8, max_iterations: 50, ..SolverSettings::default() };
+        let settings = SolverSettings::default().integrator(integrator).tolerance(1e-8).max_iterations(50);
         let method = Method { family: "mode".into(), name: "mode".into(), choice: Choice::Own(settings) };
         let height: Vec<f64> = scene.run(&method).path.iter().map(|p| p[1]).collect();
         // Turning points by parabolas through three heights.
@@ -221,12 +220,9 @@ fn step_table(csv: &mut String) {
     let method = |integrator| Method {
         family: "steps".into(),
         name: format!("{integrator:?}"),
-        choice: Choice::Own(SolverSettings {
-            integrator,
-            max_iterations: 50,
-            tolerance: 1e-6,
-            ..SolverSettings::default()
-        }),
+        choice: Choice::Own(
+            SolverSettings::default().integrator(integrator).max_iterations(50).tolerance(1e-6),
+        ),
     };
     // At the times of the coarsest step, 1/30 s.
     let coarse = |record: &Record, n: usize| Record {

@@ -30,13 +30,8 @@ pub fn presets() -> Vec<Method> {
 
 /// What all others are measured by.
 pub fn reference(tets: usize) -> Method {
-    let newton = SolverSettings {
-        solver: Solver::Newton,
-        max_iterations: 100,
-        tolerance: 1e-10,
-        ..SolverSettings::default()
-    };
-    let tight = SolverSettings { max_iterations: 400, tolerance: 1e-9, ..SolverSettings::default() };
+    let newton = SolverSettings::default().solver(Solver::Newton).max_iterations(100).tolerance(1e-10);
+    let tight = SolverSettings::default().max_iterations(400).tolerance(1e-9);
     method("reference", "reference", if tets <= 1000 { newton } else { tight })
 }
 
@@ -52,12 +47,12 @@ pub fn methods(scene: &Scene) -> Vec<Method> {
             methods.push(method("rest stiffness", format!("{n}"), with(n)));
         }
         for n in [3, 10] {
-            let plain = SolverSettings { acceleration: Acceleration::None, ..with(n) };
+            let plain = with(n).acceleration(Acceleration::None);
             methods.push(method("rest stiffness, plain", format!("{n}"), plain));
-            let anderson = SolverSettings { acceleration: Acceleration::Anderson { window: 5 }, ..with(n) };
+            let anderson = with(n).acceleration(Acceleration::Anderson { window: 5 });
             methods.push(method("rest stiffness, Anderson", format!("{n}"), anderson));
         }
-        let gradients = SolverSettings { solver: Solver::ConjugateGradients, ..with(5) };
+        let gradients = with(5).solver(Solver::ConjugateGradients);
         methods.push(method("rest stiffness, conjugate gradients", "5", gradients));
     }
     for (family, solver, counts) in [
@@ -66,25 +61,23 @@ pub fn methods(scene: &Scene) -> Vec<Method> {
         ("Jacobi", Solver::Jacobi, &[10, 30, 100]),
     ] {
         for &n in counts {
-            let settings = SolverSettings { solver, system: SystemMatrix::Laplacian, ..with(n) };
+            let settings = with(n).solver(solver).system(SystemMatrix::Laplacian);
             methods.push(method(family, format!("{n}"), settings));
         }
     }
     if is_solid {
         for n in [1, 2, 3, 10] {
-            let clusters = SolverSettings { system: SystemMatrix::Laplacian, clusters: 8, ..with(n) };
+            let clusters = with(n).system(SystemMatrix::Laplacian).clusters(8);
             methods.push(method("Laplacian, 8 clusters", format!("{n}"), clusters));
         }
     }
-    let chebyshev = SolverSettings {
-        solver: Solver::Jacobi,
-        system: SystemMatrix::Laplacian,
-        acceleration: Acceleration::Chebyshev { radius: 0.98 },
-        ..with(100)
-    };
+    let chebyshev = with(100)
+        .solver(Solver::Jacobi)
+        .system(SystemMatrix::Laplacian)
+        .acceleration(Acceleration::Chebyshev { radius: 0.98 });
     methods.push(method("Jacobi, Chebyshev", "100", chebyshev));
     for n in [1, 2, 3] {
-        methods.push(method("Newton", format!("{n}"), SolverSettings { solver: Solver::Newton, ..with(n) }));
+        methods.push(method("Newton", format!("{n}"), with(n).solver(Solver::Newton)));
     }
     methods
 }

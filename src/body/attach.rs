@@ -9,6 +9,29 @@ use crate::math::Pose64;
 impl DeformableBodySet {
     /// Ties surface vertices of a body to something, where they are now.
     ///
+    /// ```
+    /// use foible3d::prelude::*;
+    /// use rapier3d::prelude::*;
+    /// let mut physics = PhysicsWorld::new();
+    /// let hook = RigidBodyBuilder::kinematic_position_based().translation(Vector::Y);
+    /// let hook = physics.insert_body(hook);
+    /// let mut deformables = DeformableWorld::new();
+    /// let block = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2, 2, 2]).can_sleep(false);
+    /// let block = deformables.insert(block.material(DeformableMaterial::new(1.0e5, 0.3).mass_damping(5.0)))?;
+    /// // The upper face, where it is on the hook now.
+    /// let top = deformables.bodies[block].vertices_where(|x| x.y > 0.099);
+    /// let pose = *physics.bodies[hook].position();
+    /// let tie = deformables.bodies.attach(block, &top, AttachTo::RigidBody(hook, pose))?;
+    /// for _ in 0..120 {
+    ///     deformables.step(&mut physics);
+    /// }
+    /// let held = deformables.bodies.attachment(tie).map(|tie| tie.force().y);
+    /// assert!((held.unwrap_or(0.0) - 8.0 * 9.81).abs() < 0.1);
+    /// // Its user may let go, or have it break by itself: `attachment_mut(tie)` and `set_break_force`.
+    /// assert!(deformables.bodies.detach(tie).is_some());
+    /// # Ok::<(), DeformableBodyError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody); [`BodyError::NoSuchVertex`];
     /// [`BodyError::NotOnSurface`] for vertices inside of a body, which can be pinned but not attached;

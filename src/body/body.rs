@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 /// A vertex held in place, or led along by its user.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pin {
+pub(crate) struct Pin {
     pub(crate) node: u32,
     pub(crate) target: Vec3,
     /// Force that holds the vertex \[N\], of the last step.

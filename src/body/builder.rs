@@ -10,6 +10,7 @@ use parry3d::shape::Shape;
 use rapier3d::dynamics::CoefficientCombineRule;
 use rapier3d::geometry::InteractionGroups;
 use rapier3d::math::{Pose, Rotation, Vector};
+use std::fmt;
 use std::sync::Arc;
 
 /// Builds a [`DeformableBody`]. Errors of the mesh are kept until [`DeformableBodyBuilder::build`],
@@ -48,6 +49,20 @@ pub struct DeformableBodyBuilder {
 
 type Condition = Arc<dyn Fn(Vector) -> bool + Send + Sync>;
 
+/// The mesh would fill pages, and the condition of pins cannot be printed: the number of vertices, and whether there
+/// is one.
+impl fmt::Debug for DeformableBodyBuilder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("DeformableBodyBuilder")
+            .field("vertices", &self.model.as_ref().map(|model| model.vertex_count()))
+            .field("material", &self.material)
+            .field("settings", &self.settings)
+            .field("pose", &self.pose)
+            .field("pinned", &self.pinned.is_some())
+            .finish_non_exhaustive()
+    }
+}
+
 impl DeformableBodyBuilder {
     /// A cuboid of these half extents \[m\], cut into cells of five tetrahedra each.
     pub fn cuboid(half_extents: Vector, cells: [usize; 3]) -> Self {
@@ -55,7 +70,7 @@ impl DeformableBodyBuilder {
     }
 
     /// A sheet in the plane of x and z, of these half extents \[m\] and of `thickness` \[m\], cut into triangles as
-    /// [`Structure::rectangle`] says. Its solver is given the [`Laplacian`](super::SystemMatrix::Laplacian); see
+    /// [`Structure::rectangle`] says. Its solver is given the [`Laplacian`](crate::SystemMatrix::Laplacian); see
     /// [`Solver::Newton`](super::Solver::Newton) for stiff ones.
     ///
     /// ```

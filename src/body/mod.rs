@@ -28,7 +28,7 @@ mod attach;
 
 pub(crate) use attachment::{Anchors, PrescribedNode};
 pub use attachment::{AttachTo, DeformableAttachment};
-pub use body::{DeformableBody, Pin};
+pub use body::DeformableBody;
 pub use builder::DeformableBodyBuilder;
 pub use constraint_memory::JointRole;
 pub(crate) use constraint_memory::{

@@ -95,7 +95,7 @@ impl DeformableBodySet {
     /// Takes a body out, and its attachments.
     ///
     /// # Errors
-    /// [`HandleError::NoSuchBody`].
+    /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody).
     pub fn remove(&mut self, handle: DeformableBodyHandle) -> Result<DeformableBody, DeformableBodyError> {
         let body = self.bodies.remove(handle.0);
         self.attachments.retain(|_, attachment| !attachment.ties(handle));

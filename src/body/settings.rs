@@ -104,6 +104,22 @@ impl Default for Acceleration {
 
 /// How much truth a body is solved for: settings for those who do not want to choose. What each costs and how
 /// far it is off is measured in the README.
+///
+/// ```
+/// use foible3d::prelude::*;
+/// use rapier3d::prelude::*;
+/// let beam = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.1, 0.1), [10, 2, 2]);
+/// let beam = beam.pinned(|x| x.x < -0.499).can_sleep(false);
+/// let mut physics = PhysicsWorld::new();
+/// let mut deformables = DeformableWorld::new();
+/// let seen = deformables.insert(beam.clone().fidelity(Fidelity::Preview))?;
+/// let measured = deformables.insert(beam.translation(Vector::Z).fidelity(Fidelity::Engineering))?;
+/// deformables.step(&mut physics);
+/// // One iteration, whatever is left; and as many as a relative residual of 1e-5 takes.
+/// assert_eq!(deformables.bodies[seen].last_iterations(), 1);
+/// assert!(deformables.bodies[measured].last_iterations() > 1 && deformables.bodies[measured].last_converged());
+/// # Ok::<(), DeformableBodyError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Fidelity {
@@ -154,8 +170,23 @@ impl Fidelity {
 }
 
 /// How hard a body is solved. The defaults were chosen from measured error-against-time curves, see
-/// the README.
+/// the README. Setters chain from [`SolverSettings::default`] or [`SolverSettings::iterations`];
+/// [`DeformableBodyBuilder::fidelity`](super::DeformableBodyBuilder::fidelity) and
+/// [`tune`](super::DeformableBodyBuilder::tune) begin from what suits the body.
+///
+/// ```
+/// use foible3d::prelude::*;
+/// use rapier3d::prelude::*;
+/// let hard = SolverSettings::default().max_iterations(50).tolerance(1.0e-5);
+/// let bar = || DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.1, 0.1), [10, 2, 2]);
+/// assert_eq!(bar().settings(hard).build()?.settings().max_iterations, 50);
+/// // A preset, and one knob of it turned.
+/// let vibrating = bar().fidelity(Fidelity::Engineering).tune(|s| s.integrator = Integrator::Bdf2);
+/// assert_eq!(*vibrating.build()?.settings(), hard.integrator(Integrator::Bdf2));
+/// # Ok::<(), DeformableBodyError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct SolverSettings {
     /// What an iteration does.
     pub solver: Solver,
@@ -203,7 +234,68 @@ impl Default for SolverSettings {
 
 impl SolverSettings {
     /// Exactly this many iterations, unless nothing but rounding is left before.
+    #[must_use]
     pub fn iterations(count: usize) -> Self {
         Self { max_iterations: count, tolerance: 0.0, ..Self::default() }
+    }
+
+    /// Sets what an iteration does.
+    #[must_use]
+    pub fn solver(self, solver: Solver) -> Self {
+        Self { solver, ..self }
+    }
+
+    /// Sets the constant matrix.
+    #[must_use]
+    pub fn system(self, system: SystemMatrix) -> Self {
+        Self { system, ..self }
+    }
+
+    /// Sets the frames of the rest stiffness.
+    #[must_use]
+    pub fn frames(self, frames: Frames) -> Self {
+        Self { frames, ..self }
+    }
+
+    /// Sets how many slices of a solid the [`SystemMatrix::Laplacian`] lets turn.
+    #[must_use]
+    pub fn clusters(self, clusters: usize) -> Self {
+        Self { clusters, ..self }
+    }
+
+    /// Sets the limit of global iterations.
+    #[must_use]
+    pub fn max_iterations(self, max_iterations: usize) -> Self {
+        Self { max_iterations, ..self }
+    }
+
+    /// Sets the fraction of the largest force below which residual forces end the iteration.
+    #[must_use]
+    pub fn tolerance(self, tolerance: f64) -> Self {
+        Self { tolerance, ..self }
+    }
+
+    /// Sets the acceleration.
+    #[must_use]
+    pub fn acceleration(self, acceleration: Acceleration) -> Self {
+        Self { acceleration, ..self }
+    }
+
+    /// Sets how the numbers of the factor are kept.
+    #[must_use]
+    pub fn precision(self, precision: FactorPrecision) -> Self {
+        Self { precision, ..self }
+    }
+
+    /// Sets the time integration.
+    #[must_use]
+    pub fn integrator(self, integrator: Integrator) -> Self {
+        Self { integrator, ..self }
+    }
+
+    /// Sets whether a body in free flight keeps its spin.
+    #[must_use]
+    pub fn keeps_spin(self, keeps_spin: bool) -> Self {
+        Self { keeps_spin, ..self }
     }
 }

@@ -11,6 +11,7 @@ use parry3d::shape::{Shape, Triangle};
 
 /// A point on the surface of a deformable body, and what holds it there while the body moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct DeformableSurfacePoint {
     /// The body.
     pub body: DeformableBodyHandle,

@@ -7,6 +7,7 @@ use rapier3d::dynamics::{
 use rapier3d::geometry::{ColliderHandle, ColliderSet, NarrowPhase};
 use rapier3d::math::Vector;
 use rapier3d::pipeline::PhysicsWorld;
+use std::fmt;
 
 /// What a step of deformables reads and writes of rapier, for games that keep the sets themselves.
 pub struct PhysicsParts<'a> {
@@ -37,6 +38,18 @@ impl<'a> From<&'a mut PhysicsWorld> for PhysicsParts<'a> {
             impulse_joints: &mut physics.impulse_joints,
             multibody_joints: &mut physics.multibody_joints,
         }
+    }
+}
+
+/// The sets are whole worlds: how many they hold instead.
+impl fmt::Debug for PhysicsParts<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("PhysicsParts")
+            .field("gravity", &self.gravity)
+            .field("dt", &self.dt)
+            .field("bodies", &self.bodies.len())
+            .field("colliders", &self.colliders.len())
+            .finish_non_exhaustive()
     }
 }
 

@@ -15,7 +15,7 @@ use crate::math::{Mat3, Vec3, vectorized};
 #[non_exhaustive]
 pub enum SystemMatrix {
     /// `M/h² + K₀` with the linear stiffness K₀ of the rest shape, 3n×3n, applied in rotating
-    /// [`Frames`]. The default: stiff bodies are right at one
+    /// [`Frames`](crate::Frames). The default: stiff bodies are right at one
     /// iteration, bending ones at five to ten.
     #[default]
     RestStiffness,

@@ -73,6 +73,7 @@ static NEXT_ID: AtomicU64 = AtomicU64::new(1);
 
 impl DeformableModel {
     /// Prepares a mesh for simulation.
+    #[must_use]
     pub fn new(mesh: &TetMesh) -> Self {
         Self::of(&Structure::solid(mesh))
     }
@@ -89,6 +90,7 @@ impl DeformableModel {
     /// The same with muscle fibres in its tetrahedra: `direction` tells their direction at a point of the rest
     /// shape \[m\]; where that is zero or no number there are none. See
     /// [`DeformableMaterial::fibre_modulus`](crate::DeformableMaterial::fibre_modulus).
+    #[must_use]
     pub fn with_fibres(mut self, direction: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
         self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
         for tet in &self.tetrahedra {
@@ -107,6 +109,7 @@ impl DeformableModel {
     /// lock, in bending and near incompressibility, as linear tetrahedra do, whose stiffness falls to the
     /// true one only with the mesh. Elements cost three times as much, and the factor is twice as large:
     /// worth it wherever the mesh is coarse. What it gains is in the README.
+    #[must_use]
     pub fn smoothed(mut self) -> Self {
         if !self.is_solid() {
             return self;

@@ -55,6 +55,7 @@ pub(crate) struct Spring {
 
 impl Structure {
     /// The tetrahedra of a mesh.
+    #[must_use]
     pub fn solid(mesh: &TetMesh) -> Self {
         Self { vertices: mesh.vertices().to_vec(), tetrahedra: mesh.tetrahedra().to_vec(), ..Self::default() }
     }
@@ -62,6 +63,7 @@ impl Structure {
     /// A mass–spring network: the edges of a mesh as springs of `E V/l²` each, V the volume of the tetrahedra
     /// around the edge. Under random directions that is Young's modulus E at a Poisson's ratio of 1/4, the only
     /// one that springs can have.
+    #[must_use]
     pub fn spring_network(mesh: &TetMesh) -> Self {
         Self { is_network: true, ..Self::solid(mesh) }
     }

@@ -7,6 +7,7 @@ use rapier3d::math::Vector;
 
 /// A point where a deformable body touched a collider in the last step.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct DeformableContact {
     /// The deformable body.
     pub body: DeformableBodyHandle,
@@ -24,6 +25,7 @@ pub struct DeformableContact {
 
 /// A point where two deformable bodies touched in the last step, or one touched itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct DeformablePairContact {
     /// The first body.
     pub body1: DeformableBodyHandle,
@@ -42,6 +44,7 @@ pub struct DeformablePairContact {
 /// A contact between two rigid bodies that the last step solved, because one of them is touched by a
 /// deformable body, or holds one that is. What rapier's own contact then shows is its remainder.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct RigidContact {
     /// The first collider, as rapier orders the pair.
     pub collider1: ColliderHandle,
@@ -57,6 +60,7 @@ pub struct RigidContact {
 
 /// A joint that the last step solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum SolvedJoint {
     /// A joint of rapier's `ImpulseJointSet`.
     Impulse(ImpulseJointHandle),
@@ -66,6 +70,7 @@ pub enum SolvedJoint {
 
 /// Force of one axis of a joint in the last step.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct JointForce {
     /// The joint.
     pub joint: SolvedJoint,

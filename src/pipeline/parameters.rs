@@ -4,7 +4,18 @@ use crate::solver::{ContactLimits, IslandReport};
 use std::time::Duration;
 
 /// Parameters of all bodies of a world. The defaults suit scenes in metres and kilograms.
+///
+/// ```
+/// use foible3d::prelude::*;
+/// let mut deformables = DeformableWorld::new();
+/// // Rigid bodies up to the eighth from those that are touched; 64 MB for columns.
+/// deformables.parameters = DeformableParameters::default().neighbourhood_bodies(8).column_budget(64 << 20);
+/// // Or one of them, as the fields are public.
+/// deformables.parameters.restitution_threshold = 0.2;
+/// assert_eq!(deformables.parameters.contact_tolerance, 1.0e-8);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct DeformableParameters {
     /// Relative accuracy to which contact forces are solved. At 1e-6 a symmetric stack of 1000:1
     /// begins to sway, at 1e-8 it does not; Newton's method gets there in one more step.
@@ -34,6 +45,36 @@ impl Default for DeformableParameters {
 }
 
 impl DeformableParameters {
+    /// Sets the relative accuracy of contact forces.
+    #[must_use]
+    pub fn contact_tolerance(self, contact_tolerance: f64) -> Self {
+        Self { contact_tolerance, ..self }
+    }
+
+    /// Sets the speed [m/s] at which overlaps are undone.
+    #[must_use]
+    pub fn max_corrective_velocity(self, max_corrective_velocity: f64) -> Self {
+        Self { max_corrective_velocity, ..self }
+    }
+
+    /// Sets the speed [m/s] below which new contacts do not bounce.
+    #[must_use]
+    pub fn restitution_threshold(self, restitution_threshold: f64) -> Self {
+        Self { restitution_threshold, ..self }
+    }
+
+    /// Sets how many rigid bodies around the touched ones enter the solve.
+    #[must_use]
+    pub fn neighbourhood_bodies(self, neighbourhood_bodies: usize) -> Self {
+        Self { neighbourhood_bodies, ..self }
+    }
+
+    /// Sets the memory \[bytes\] for columns of inverses.
+    #[must_use]
+    pub fn column_budget(self, column_budget: usize) -> Self {
+        Self { column_budget, ..self }
+    }
+
     pub(crate) fn contact_limits(&self) -> ContactLimits {
         ContactLimits {
             recovery_speed: self.max_corrective_velocity.max(0.0),

@@ -7,15 +7,51 @@ use crate::body::{DeformableBodySet, Integrator};
 use crate::coupling::PhysicsParts;
 use crate::error::DeformableBodyError;
 use crate::solver::{FactorKey, SECOND_ORDER};
+use std::fmt;
 
 /// Steps deformable bodies beside rapier: for games with their own loop and sets. Holds memory and
 /// caches only: a fresh pipeline goes on with the same bits.
 ///
 /// Call [`DeformablePipeline::before_step`], step rapier, then [`DeformablePipeline::after_step`],
-/// all with the same `dt`.
+/// all with the same `dt`. A loop with sets of its own is `examples/own_loop.rs`.
+///
+/// ```
+/// use foible3d::prelude::*;
+/// use rapier3d::prelude::*;
+/// let mut physics = PhysicsWorld::new();
+/// let (_, floor) = physics.insert(RigidBodyBuilder::fixed(), ColliderBuilder::cuboid(2.0, 0.1, 2.0));
+/// let mut deformables = DeformableBodySet::new();
+/// let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2, 2, 2]).translation(Vector::Y * 0.2);
+/// let cube = deformables.insert(cube.material(DeformableMaterial::new(1.0e5, 0.3).mass_damping(5.0)))?;
+/// let (parameters, mut pipeline) = (DeformableParameters::default(), DeformablePipeline::new());
+/// for _ in 0..120 {
+///     let mut parts = PhysicsParts {
+///         gravity: physics.gravity,
+///         dt: physics.integration_parameters.dt,
+///         bodies: &mut physics.bodies,
+///         colliders: &physics.colliders,
+///         narrow_phase: &physics.narrow_phase,
+///         impulse_joints: &mut physics.impulse_joints,
+///         multibody_joints: &mut physics.multibody_joints,
+///     };
+///     pipeline.before_step(&parameters, &mut deformables, &mut parts);
+///     physics.step(); // or `PhysicsPipeline::step` with all of rapier's sets
+///     pipeline.after_step(&mut PhysicsParts::from(&mut physics));
+/// }
+/// let load: Vector = pipeline.contacts().iter().filter(|c| c.collider == floor).map(|c| c.force).sum();
+/// assert!((f64::from(load.y) - 9.81 * deformables[cube].mass()).abs() < 0.1);
+/// # Ok::<(), DeformableBodyError>(())
+/// ```
 #[derive(Default)]
 pub struct DeformablePipeline {
     scratch: StepScratch,
+}
+
+/// Caches would fill pages: what the last step did instead.
+impl fmt::Debug for DeformablePipeline {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("DeformablePipeline").field("counters", self.counters()).finish_non_exhaustive()
+    }
 }
 
 impl DeformablePipeline {

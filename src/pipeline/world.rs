@@ -28,7 +28,7 @@ use rapier3d::pipeline::{EventHandler, PhysicsHooks, PhysicsWorld};
 /// assert!((carried.y - 64.0 * 9.81).abs() < 0.1);
 /// # Ok::<(), DeformableBodyError>(())
 /// ```
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct DeformableWorld {
     /// The bodies.
     pub bodies: DeformableBodySet,
@@ -90,6 +90,28 @@ impl DeformableWorld {
     }
 
     /// Contacts of the last step; of sleeping bodies those with which they fell asleep.
+    ///
+    /// ```
+    /// use foible3d::prelude::*;
+    /// use rapier3d::prelude::*;
+    /// let mut physics = PhysicsWorld::new();
+    /// let (_, floor) = physics.insert(RigidBodyBuilder::fixed(), ColliderBuilder::cuboid(2.0, 0.1, 2.0));
+    /// let mut deformables = DeformableWorld::new();
+    /// let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2, 2, 2]).translation(Vector::Y * 0.2);
+    /// let cube = deformables.insert(cube.material(DeformableMaterial::new(1.0e5, 0.3).mass_damping(5.0)))?;
+    /// for _ in 0..120 {
+    ///     deformables.step(&mut physics);
+    /// }
+    /// // Where it is pressed most, by what, and how deep it is there.
+    /// let most = deformables.contacts().iter().max_by(|a, b| a.force.length().total_cmp(&b.force.length()));
+    /// let most = most.expect("it lies on the floor");
+    /// assert_eq!((most.body, most.collider), (cube, floor));
+    /// assert!(most.normal.y > 0.999 && (most.point.y - 0.1).abs() < 1.0e-4 && most.gap.abs() < 1.0e-4);
+    /// // All of them together.
+    /// let carried = deformables.contact_force(cube, floor);
+    /// assert!((carried.y - 8.0 * 9.81).abs() < 0.1);
+    /// # Ok::<(), DeformableBodyError>(())
+    /// ```
     pub fn contacts(&self) -> &[DeformableContact] {
         self.pipeline.contacts()
     }
@@ -104,7 +126,7 @@ impl DeformableWorld {
         self.contacts().iter().filter(move |c| c.body == body)
     }
 
-    /// Force \[N\] of a collider on a body in the last step.
+    /// Force \[N\] of a collider on a body in the last step: the sum of [`DeformableWorld::contacts`] between them.
     pub fn contact_force(&self, body: DeformableBodyHandle, collider: ColliderHandle) -> Vector {
         let pair = self.contacts_of(body).filter(|c| c.collider == collider);
         pair.map(|c| c.force).sum()

@@ -57,5 +57,5 @@ pub fn total_energy(body: &DeformableBody) -> f64 {
 
 /// Solved until only rounding is left.
 pub fn converged() -> SolverSettings {
-    SolverSettings { max_iterations: 300, tolerance: 1e-9, ..SolverSettings::default() }
+    SolverSettings::default().max_iterations(300).tolerance(1e-9)
 }

@@ -1,0 +1,61 @@
+//! What the types of the surface promise without being run.
+use foible3d::prelude::*;
+use foible3d::{BodyError, DeformableState, HandleError, MaterialError, MeshError};
+use std::fmt::Debug;
+
+/// A game may move it to another thread, and read it from several.
+const fn is_thread_safe<T: Send + Sync>() {}
+
+/// A user's own types that hold it may derive these.
+const fn is_printed<T: Debug>() {}
+const fn is_cloned<T: Clone>() {}
+
+/// Checked by the compiler, type by type.
+macro_rules! promises {
+    ($($promise:ident: $($type:ty),+;)+) => {
+        const _: () = { $($($promise::<$type>();)+)+ };
+    };
+}
+
+promises! {
+    is_thread_safe: DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody,
+        DeformableBodyBuilder, DeformableModel, DeformableState, DeformableMaterial, DeformableParameters,
+        DeformableCounters, TetMesh, Structure, SolverSettings, Solver, SystemMatrix, Frames, Integrator,
+        Acceleration, FactorPrecision, Fidelity, Elasticity, DeformableBodyHandle, DeformableAttachment,
+        DeformableAttachmentHandle, AttachTo, DeformableContact, DeformablePairContact, RigidContact, JointForce,
+        JointRole, SolvedJoint, DeformableSurfacePoint, DeformableBodyError, BodyError, HandleError, MaterialError,
+        MeshError;
+    is_printed: DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody,
+        DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh, Structure, DeformableAttachment;
+    is_cloned: DeformableBodySet, DeformableBody, DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh,
+        Structure, DeformableAttachment, AttachTo, DeformableBodyError, MeshError;
+}
+
+/// Copied as plain numbers are.
+const fn is_copied<T: Copy + PartialEq + Debug>() {}
+
+promises! {
+    is_copied: DeformableMaterial, DeformableParameters, DeformableCounters, SolverSettings, Solver, SystemMatrix,
+        Frames, Integrator, Acceleration, FactorPrecision, Fidelity, Elasticity, DeformableBodyHandle,
+        DeformableAttachmentHandle, DeformableContact, DeformablePairContact, RigidContact, JointForce, JointRole,
+        SolvedJoint, DeformableSurfacePoint, BodyError, HandleError, MaterialError;
+}
+
+/// Names of types in a piece of source: words in CamelCase.
+fn types(text: &str) -> impl Iterator<Item = &str> {
+    let words = text.split(|c: char| !c.is_alphanumeric() && c != '_');
+    words.filter(|word| word.starts_with(char::is_uppercase))
+}
+
+#[test]
+fn every_type_of_the_surface_is_promised_to_be_thread_safe() {
+    let surface = include_str!("../src/lib.rs");
+    let exported: Vec<&str> =
+        surface.split("\npub use ").skip(1).flat_map(|line| types(line.split(';').next().unwrap())).collect();
+    assert!(exported.contains(&"DeformableWorld") && exported.contains(&"MeshError"));
+    let promises =
+        include_str!("api.rs").split("is_thread_safe: ").nth(1).unwrap().split(';').next().unwrap();
+    let promised: Vec<&str> = types(promises).collect();
+    let missing: Vec<_> = exported.iter().filter(|name| !promised.contains(name)).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
