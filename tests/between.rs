@@ -125,10 +125,11 @@ fn groups_and_attachments_keep_bodies_from_colliding() {
         let cube = soft([0.1; 3], [2; 3], Vector::Y * y).collision_groups(not_each_other);
         world.insert(cube).unwrap()
     });
-    let tied = [0.1, 0.28].map(|y| world.insert(soft([0.1; 3], [2; 3], Vector::new(1.0, y, 0.0))).unwrap());
-    let top = at_rest_where(&world.bodies[tied[0]], |x| x[1] > 0.099);
-    let bottom = at_rest_where(&world.bodies[tied[1]], |x| x[1] < -0.099);
-    world.bodies.attach(tied[0], &top, AttachTo::Deformable(tied[1], bottom)).unwrap();
+    let attached =
+        [0.1, 0.28].map(|y| world.insert(soft([0.1; 3], [2; 3], Vector::new(1.0, y, 0.0))).unwrap());
+    let top = at_rest_where(&world.bodies[attached[0]], |x| x[1] > 0.099);
+    let bottom = at_rest_where(&world.bodies[attached[1]], |x| x[1] < -0.099);
+    world.bodies.attach(attached[0], &top, AttachTo::Deformable(attached[1], bottom)).unwrap();
     (0..60).for_each(|_| world.step(&mut physics));
     let among = |bodies: [DeformableBodyHandle; 2]| {
         world
@@ -137,7 +138,7 @@ fn groups_and_attachments_keep_bodies_from_colliding() {
             .filter(|c| bodies.contains(&c.body1) && bodies.contains(&c.body2))
             .count()
     };
-    assert_eq!((among(pair), among(tied)), (0, 0));
+    assert_eq!((among(pair), among(attached)), (0, 0));
 }
 
 #[test]

@@ -173,6 +173,6 @@ fn a_body_deep_in_itself_comes_apart() {
 
 #[test]
 #[ignore = "slow tier"]
-fn a_body_somewhat_deeper_or_less_deep_in_itself_comes_apart() {
+fn a_body_in_itself_by_a_sixth_and_a_half_of_its_thickness_comes_apart() {
     strips_in_themselves_come_apart(&[0.05, 0.03]);
 }

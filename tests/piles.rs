@@ -2,6 +2,7 @@
 mod common;
 use common::soft_bodies::*;
 use common::*;
+use foible3d::DeformableState;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 

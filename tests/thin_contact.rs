@@ -60,7 +60,7 @@ fn cloth_drapes_over_a_ball_and_a_rope_over_a_box() {
             let builder = builder.translation(Vector::Y * 0.85).material(soft).can_sleep(false);
             let body = world.insert(builder).unwrap();
             let (mut inside, mut speed) = (0.0f64, 0.0);
-            for step in 0..600 {
+            for step in 0..360 {
                 world.step(&mut physics);
                 let body = &world.bodies[body];
                 for p in positions(body) {
@@ -71,7 +71,7 @@ fn cloth_drapes_over_a_ball_and_a_rope_over_a_box() {
                     };
                     inside = inside.max(depth);
                 }
-                if step > 540 {
+                if step > 300 {
                     speed = body.max_speed().max(speed);
                 }
             }
