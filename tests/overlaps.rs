@@ -167,12 +167,12 @@ fn strips_in_themselves_come_apart(heights: &[f32]) {
 
 #[test]
 fn a_body_deep_in_itself_comes_apart() {
-    // By a third and by two thirds of its thickness.
-    strips_in_themselves_come_apart(&[0.04, 0.02]);
+    // By two thirds of its thickness.
+    strips_in_themselves_come_apart(&[0.02]);
 }
 
 #[test]
 #[ignore = "slow tier"]
-fn a_body_in_itself_by_a_sixth_and_a_half_of_its_thickness_comes_apart() {
-    strips_in_themselves_come_apart(&[0.05, 0.03]);
+fn a_body_in_itself_by_a_sixth_to_a_half_of_its_thickness_comes_apart() {
+    strips_in_themselves_come_apart(&[0.05, 0.04, 0.03]);
 }
