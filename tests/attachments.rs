@@ -1,4 +1,4 @@
-//! Vertices tied to the world, to rigid bodies and links, and to one another.
+//! Vertices attached to the world, to rigid bodies and links, and to one another.
 mod common;
 use common::*;
 use foible3d::prelude::*;
@@ -25,26 +25,26 @@ fn tied_to_the_world_is_as_good_as_pinned() {
     let mut physics = PhysicsWorld::new();
     let mut world = DeformableWorld::new();
     let pinned = world.insert(slab().pinned(|x| x.x < -0.199)).unwrap();
-    let tied = world.insert(slab().translation(Vector::Z)).unwrap();
-    let ends = left(&world.bodies[tied]);
-    let attachment = world.bodies.attach(tied, &ends, AttachTo::World).unwrap();
+    let attached = world.insert(slab().translation(Vector::Z)).unwrap();
+    let ends = left(&world.bodies[attached]);
+    let attachment = world.bodies.attach(attached, &ends, AttachTo::World).unwrap();
     for _ in 0..SETTLED {
         world.step(&mut physics);
     }
-    let weight = world.bodies[tied].mass() * G;
+    let weight = world.bodies[attached].mass() * G;
     let force = world.bodies.attachment(attachment).unwrap().force();
     assert!((f64::from(force.y) / weight - 1.0).abs() < 1e-4, "{force} of {weight} N");
     let tip = |b| mean_position(&world.bodies[b], &right(&world.bodies[b]))[1];
-    // Not quite the same: tied vertices are solved for to 1e-8 of the force, pinned ones are not unknowns.
-    assert!((tip(tied) / tip(pinned) - 1.0).abs() < 1e-3, "{} {}", tip(tied), tip(pinned));
-    // Moved along with what it is tied to, and let go.
+    // Not quite the same: attached vertices are solved for to 1e-8 of the force, pinned ones are not unknowns.
+    assert!((tip(attached) / tip(pinned) - 1.0).abs() < 1e-3, "{} {}", tip(attached), tip(pinned));
+    // Moved along with what it is attached to, and let go.
     world.bodies.attachment_mut(attachment).unwrap().translate(Vector::Y * 0.2);
     (0..SETTLED).for_each(|_| world.step(&mut physics));
-    let end = mean_position(&world.bodies[tied], &ends);
+    let end = mean_position(&world.bodies[attached], &ends);
     assert!((end[1] - 0.2).abs() < 1e-5, "{end:?}");
     assert!(world.bodies.detach(attachment).is_some() && world.bodies.detach(attachment).is_none());
     (0..60).for_each(|_| world.step(&mut physics));
-    assert!(world.bodies[tied].center_of_mass()[1] < -1.0);
+    assert!(world.bodies[attached].center_of_mass()[1] < -1.0);
 }
 
 #[test]
@@ -192,7 +192,7 @@ fn node_that_two_attachments_and_a_pin_hold_carries_no_more_than_the_weight() {
     let body = world.insert(slab().pinned(|x| x.x < -0.199 && x.z < -0.09)).unwrap();
     let ends = left(&world.bodies[body]);
     let on = || AttachTo::RigidBody(frame, *physics.bodies[frame].position());
-    let ties = [
+    let attachments = [
         world.bodies.attach(body, &ends, on()).unwrap(),
         world.bodies.attach(body, &ends[1..], on()).unwrap(),
         world.bodies.attach(body, &ends[..1], AttachTo::World).unwrap(),
@@ -202,8 +202,8 @@ fn node_that_two_attachments_and_a_pin_hold_carries_no_more_than_the_weight() {
         let away = Vector::new(0.3, 0.7 + 0.001 * (step as f32 - 60.0).max(0.0), -0.2);
         physics.bodies[frame].set_next_kinematic_translation(away);
         world.step(&mut physics);
-        for tie in ties {
-            let force = world.bodies.attachment(tie).unwrap().force();
+        for attachment in attachments {
+            let force = world.bodies.attachment(attachment).unwrap().force();
             assert!(force.length() < 1e5, "step {step}: {force}");
         }
     }
@@ -216,8 +216,8 @@ fn attachment_of_infinite_compliance_holds_nothing_and_disturbs_nothing() {
     let mut world = DeformableWorld::new();
     let body = world.insert(slab().translation(Vector::Y * 0.3)).unwrap();
     let ends = left(&world.bodies[body]);
-    let tie = world.bodies.attach(body, &ends, AttachTo::World).unwrap();
-    world.bodies.attachment_mut(tie).unwrap().set_compliance(f64::INFINITY);
+    let attachment = world.bodies.attach(body, &ends, AttachTo::World).unwrap();
+    world.bodies.attachment_mut(attachment).unwrap().set_compliance(f64::INFINITY);
     for _ in 0..240 {
         world.step(&mut physics);
     }
@@ -235,13 +235,13 @@ fn breaking_wakes_what_sleeps_on_it_and_so_does_removing_what_it_is_tied_to() {
         let body = world.insert(body).unwrap();
         let ends = left(&world.bodies[body]);
         let on = AttachTo::RigidBody(anchor, *physics.bodies[anchor].position());
-        let tie = world.bodies.attach(body, &ends, on).unwrap();
+        let attachment = world.bodies.attach(body, &ends, on).unwrap();
         for _ in 0..400 {
             world.step(&mut physics);
         }
         assert!(world.bodies[body].is_sleeping());
         if breaks {
-            world.bodies.attachment_mut(tie).unwrap().set_break_force(1.0);
+            world.bodies.attachment_mut(attachment).unwrap().set_break_force(1.0);
         } else {
             physics.remove_body(anchor);
         }

@@ -1,24 +1,9 @@
-//! Contact between deformable bodies.
-
+//! Contact between two or three deformable bodies: forces, momentum, sleep.
 mod common;
+use common::soft_bodies::*;
 use common::*;
 use foible3d::prelude::*;
-use parry3d::bounding_volume::BoundingVolume;
 use rapier3d::prelude::*;
-
-fn soft(half: [f32; 3], cells: [usize; 3], at: Vector) -> DeformableBodyBuilder {
-    let material = DeformableMaterial::new(1e6, 0.3).friction(MU);
-    let builder = DeformableBodyBuilder::cuboid(half.into(), cells);
-    builder.translation(at).material(material).can_sleep(false)
-}
-
-fn fastest(world: &DeformableWorld) -> f64 {
-    world.bodies.iter().map(|(_, b)| b.max_speed()).fold(0.0, f64::max)
-}
-
-fn deepest(world: &DeformableWorld) -> f64 {
-    world.pair_contacts().iter().map(|c| c.gap).fold(0.0, f64::min)
-}
 
 #[test]
 fn interface_of_two_cubes_carries_the_weight_of_the_upper() {
@@ -74,87 +59,6 @@ fn colliding_bodies_keep_their_momentum() {
     println!("momentum off by {off:.1e}, touching in {touching} steps");
     // f64 sums over some 300 nodes: a few roundings of 1e-16 each.
     assert!(touching > 1 && off < 1e-14, "{off:e}");
-}
-
-/// Bodies of five shapes, four a layer, falling into a box.
-fn pile(count: usize, world: &mut DeformableWorld) -> PhysicsWorld {
-    let (mut physics, _) = world_with_floor(1.0 / 60.0);
-    for (x, z) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
-        let half = Vector::new(if x == 0.0 { 0.7 } else { 0.1 }, 1.0, if z == 0.0 { 0.7 } else { 0.1 });
-        let wall = RigidBodyBuilder::fixed().translation(Vector::new(0.6 * x, 1.0, 0.6 * z));
-        physics.insert(wall, ColliderBuilder::cuboid(half.x, half.y, half.z).friction(0.5));
-    }
-    for k in 0..count {
-        let builder = match k % 5 {
-            0 => DeformableBodyBuilder::cuboid(Vector::splat(0.12), [4; 3]),
-            1 => DeformableBodyBuilder::filled(&Ball::new(0.13), 0.05),
-            2 => DeformableBodyBuilder::cuboid(Vector::new(0.2, 0.06, 0.1), [6, 2, 4]),
-            3 => DeformableBodyBuilder::filled(&Capsule::new_y(0.08, 0.09), 0.05),
-            _ => DeformableBodyBuilder::filled(&Cylinder::new(0.08, 0.13), 0.05),
-        };
-        let (layer, place) = (k / 4, k % 4);
-        let side = |positive: bool| if positive { 0.22 } else { -0.22 };
-        let at = Vector::new(
-            side(place % 2 == 1) + 0.013 * (k % 3) as f32,
-            0.3 + 0.45 * layer as f32,
-            side(place > 1) - 0.011 * (k % 7) as f32,
-        );
-        let turn = Vector::new(0.2, 0.5, 0.1) * k as f32;
-        let material = DeformableMaterial::new(1e6, 0.3).friction(MU);
-        world.insert(builder.translation(at).rotation(turn).material(material)).unwrap();
-    }
-    physics
-}
-
-#[test]
-fn pile_of_twenty_falls_asleep() {
-    let mut world = DeformableWorld::new();
-    let mut physics = pile(20, &mut world);
-    let (mut last, mut resting, mut asleep_after) = (0.0, 0.0f64, None);
-    for step in 0..600 {
-        world.step(&mut physics);
-        last = deepest(&world);
-        if fastest(&world) < 0.05 {
-            resting = resting.min(last);
-        }
-        if asleep_after.is_none() && world.bodies.iter().all(|(_, b)| b.is_sleeping()) {
-            asleep_after = Some(f64::from(step) / 60.0);
-        }
-    }
-    println!("asleep after {asleep_after:?} s, deepest at rest {resting:.1e} m, at the end {last:.1e} m");
-    // The last body lands after 1.3 s and rocks.
-    assert!(asleep_after.is_some_and(|t| t < 5.0), "{asleep_after:?}");
-    // A ten-thousandth of the smallest extent, 0.12 m.
-    assert!(last > -1e-5 && resting > -1e-5, "{last:e} {resting:e}");
-    for (_, body) in world.bodies.iter() {
-        let [x, y, z] = body.center_of_mass();
-        assert!(x.abs() < 0.5 && z.abs() < 0.5 && y > 0.05, "fell out: {x} {y} {z}");
-    }
-}
-
-#[cfg(feature = "parallel")]
-#[test]
-fn a_pile_has_the_same_bits_with_any_number_of_threads_and_a_fresh_pipeline() {
-    let run = |threads: usize, fresh: bool| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| {
-            let mut world = DeformableWorld::new();
-            let mut physics = pile(20, &mut world);
-            // Two seconds: all have landed, and the first lie still.
-            for _ in 0..120 {
-                if fresh {
-                    world.pipeline = DeformablePipeline::new();
-                }
-                world.step(&mut physics);
-            }
-            assert!(world.pair_contacts().iter().any(|c| c.force != Vector::ZERO));
-            world.bodies.iter().map(|(_, b)| b.state().clone()).collect::<Vec<_>>()
-        })
-    };
-    let one = run(1, false);
-    assert_eq!(one, run(2, false));
-    assert_eq!(one, run(4, false));
-    assert_eq!(one, run(1, true));
 }
 
 #[test]
@@ -221,10 +125,11 @@ fn groups_and_attachments_keep_bodies_from_colliding() {
         let cube = soft([0.1; 3], [2; 3], Vector::Y * y).collision_groups(not_each_other);
         world.insert(cube).unwrap()
     });
-    let tied = [0.1, 0.28].map(|y| world.insert(soft([0.1; 3], [2; 3], Vector::new(1.0, y, 0.0))).unwrap());
-    let top = at_rest_where(&world.bodies[tied[0]], |x| x[1] > 0.099);
-    let bottom = at_rest_where(&world.bodies[tied[1]], |x| x[1] < -0.099);
-    world.bodies.attach(tied[0], &top, AttachTo::Deformable(tied[1], bottom)).unwrap();
+    let attached =
+        [0.1, 0.28].map(|y| world.insert(soft([0.1; 3], [2; 3], Vector::new(1.0, y, 0.0))).unwrap());
+    let top = at_rest_where(&world.bodies[attached[0]], |x| x[1] > 0.099);
+    let bottom = at_rest_where(&world.bodies[attached[1]], |x| x[1] < -0.099);
+    world.bodies.attach(attached[0], &top, AttachTo::Deformable(attached[1], bottom)).unwrap();
     (0..60).for_each(|_| world.step(&mut physics));
     let among = |bodies: [DeformableBodyHandle; 2]| {
         world
@@ -233,166 +138,7 @@ fn groups_and_attachments_keep_bodies_from_colliding() {
             .filter(|c| bodies.contains(&c.body1) && bodies.contains(&c.body2))
             .count()
     };
-    assert_eq!((among(pair), among(tied)), (0, 0));
-}
-
-/// Largest depth \[m\] of a surface node in a tetrahedron that is farther than `crease` \[m\] from it at rest,
-/// by the least barycentric weight times the element's height: brute force.
-fn overlap_with_itself(body: &DeformableBody, mesh: &TetMesh, crease: f64) -> f64 {
-    let at = |v: u32| nalgebra::Vector3::from(body.position(v as usize).unwrap());
-    let rest = |v: u32| nalgebra::Vector3::from(mesh.vertices()[v as usize]);
-    let surface: std::collections::BTreeSet<u32> = body.model().surface_triangles().flatten().collect();
-    let mut deepest = 0.0f64;
-    for tet in mesh.tetrahedra() {
-        let [a, b, c, d] = tet.map(at);
-        let edges = nalgebra::Matrix3::from_columns(&[b - a, c - a, d - a]);
-        let Some(inverse) = edges.try_inverse() else { continue };
-        let far = |v: &&u32| tet.iter().all(|t| (rest(*t) - rest(**v)).norm() > crease);
-        for &v in surface.iter().filter(far) {
-            let w = inverse * (at(v) - a);
-            let rows = [inverse.row(0).norm(), inverse.row(1).norm(), inverse.row(2).norm()];
-            let fourth = (inverse.row(0) + inverse.row(1) + inverse.row(2)).norm();
-            let depths = [w[0] / rows[0], w[1] / rows[1], w[2] / rows[2], (1.0 - w.sum()) / fourth];
-            deepest = deepest.max(depths.into_iter().fold(f64::INFINITY, f64::min));
-        }
-    }
-    deepest
-}
-
-#[test]
-fn a_curled_finger_lies_on_itself() {
-    let mesh = TetMesh::cuboid([0.5, 0.03, 0.06], [24, 2, 3]).unwrap();
-    for iterations in [1, 3, 10] {
-        let mut physics = PhysicsWorld::new();
-        let mut world = DeformableWorld::new();
-        let finger = DeformableBodyBuilder::mesh(&mesh)
-            .material(DeformableMaterial::new(1e4, 0.3).friction(0.5).mass_damping(2.0))
-            .settings(SolverSettings::iterations(iterations))
-            .self_contact(true)
-            .can_sleep(false)
-            .pinned(|x| x.x < 0.0 || x.x > 0.47);
-        let finger = world.insert(finger).unwrap();
-        let body = &world.bodies[finger];
-        let at = |v: usize| Vector::from(body.position(v).unwrap().map(|c| c as f32));
-        let tip: Vec<(usize, Vector)> =
-            body.pinned().map(|v| (v, at(v))).filter(|(_, x)| x.x > 0.4).collect();
-        let (mut worst, mut touching) = (0.0f64, 0);
-        for step in 0..360 {
-            // The tip is led over the other half, upside down, and let go.
-            let part = (step as f32 / 200.0).min(1.0);
-            let (sin, cos) = (part * std::f32::consts::PI).sin_cos();
-            let centre = Vector::new(0.04 + 0.445 * cos, 0.14 * part + 0.3 * sin, 0.0);
-            for (vertex, from) in tip.iter().filter(|_| step <= 200) {
-                let arm = *from - Vector::X * 0.485;
-                let turned = Vector::new(arm.x * cos - arm.y * sin, arm.x * sin + arm.y * cos, arm.z);
-                world.bodies[finger].move_pin(*vertex, centre + turned).unwrap();
-                if step == 200 {
-                    world.bodies[finger].unpin(*vertex).unwrap();
-                }
-            }
-            world.step(&mut physics);
-            touching += usize::from(world.pair_contacts().iter().any(|c| c.force != Vector::ZERO));
-            if step % 10 == 9 {
-                worst = worst.max(overlap_with_itself(&world.bodies[finger], &mesh, 0.15));
-            }
-        }
-        let free: Vec<usize> = at_rest_where(&world.bodies[finger], |x| x[0] > 0.3);
-        let height = mean_position(&world.bodies[finger], &free)[1];
-        println!(
-            "{iterations} iterations: deepest {worst:.1e} m, touching in {touching} steps, its end {height:.4} m high, {:.1e} m/s",
-            world.bodies[finger].max_speed()
-        );
-        // A hundredth of the thickness, while it lands.
-        assert!(touching > 100 && worst < 6e-4);
-        assert!((0.055..0.07).contains(&height));
-    }
-}
-
-#[test]
-fn overlapping_bodies_come_apart() {
-    // Edges are of 0.09 m.
-    for overlap in [0.01f32, 0.03, 0.05, 0.1, 0.2, 0.3] {
-        let mut physics = PhysicsWorld::new();
-        physics.gravity = Vector::ZERO;
-        let mut world = DeformableWorld::new();
-        let left = world.insert(soft([0.2; 3], [5; 3], Vector::X * (overlap / 2.0 - 0.2))).unwrap();
-        let right = soft([0.2; 3], [5; 3], Vector::new(0.2 - overlap / 2.0, 0.013, 0.007));
-        let right = world.insert(right.rotation(Vector::X * 0.1)).unwrap();
-        let mut fastest_ever = 0.0f64;
-        for _ in 0..180 {
-            world.step(&mut physics);
-            fastest_ever = fastest_ever.max(fastest(&world));
-        }
-        let boxes = [left, right].map(|b| world.bodies[b].aabb());
-        println!("{overlap} m: {fastest_ever:.2} m/s at the most");
-        assert!(!boxes[0].intersects(&boxes[1]), "still in one another");
-        // Overlaps are recovered at 1 m/s; what is squeezed out of one may be somewhat faster.
-        assert!(fastest_ever < 3.0);
-    }
-}
-
-#[test]
-fn bodies_in_the_very_same_place_come_apart() {
-    let mut physics = PhysicsWorld::new();
-    physics.gravity = Vector::ZERO;
-    let mut world = DeformableWorld::new();
-    let [a, b] = [0, 1].map(|_| world.insert(soft([0.2; 3], [5; 3], Vector::ZERO)).unwrap());
-    let mut fastest_ever = 0.0f64;
-    for _ in 0..240 {
-        world.step(&mut physics);
-        fastest_ever = fastest_ever.max(fastest(&world));
-    }
-    let boxes = [a, b].map(|body| world.bodies[body].aabb());
-    println!("{fastest_ever:.2} m/s at the most");
-    assert!(!boxes[0].intersects(&boxes[1]), "still in one another");
-    assert!(fastest_ever < 3.0);
-}
-
-#[test]
-fn a_body_deep_in_itself_comes_apart() {
-    // A strip 6 cm thick is bent over itself while it does not feel that, its end led into its other half.
-    let mesh = TetMesh::cuboid([0.5, 0.03, 0.06], [24, 2, 3]).unwrap();
-    for height in [0.05f32, 0.04, 0.03, 0.02] {
-        let (mut physics, _) = world_with_floor(1.0 / 60.0);
-        let mut world = DeformableWorld::new();
-        let strip = DeformableBodyBuilder::mesh(&mesh)
-            .translation(Vector::Y * 0.03)
-            .material(DeformableMaterial::new(1e4, 0.3).friction(0.5).mass_damping(2.0))
-            .can_sleep(false)
-            .pinned(|x| x.x < 0.0 || x.x > 0.47);
-        let strip = world.insert(strip).unwrap();
-        let body = &world.bodies[strip];
-        let at = |v: usize| Vector::from(body.position(v).unwrap().map(|c| c as f32));
-        let tip: Vec<(usize, Vector)> =
-            body.pinned().map(|v| (v, at(v))).filter(|(_, x)| x.x > 0.4).collect();
-        for step in 0..300 {
-            let part = (step as f32 / 200.0).min(1.0);
-            let (sin, cos) = (part * std::f32::consts::PI).sin_cos();
-            let centre = Vector::new(0.04 + 0.445 * cos, 0.03 + height * part + 0.3 * sin, 0.0);
-            for (vertex, from) in &tip {
-                let arm = *from - Vector::new(0.485, 0.03, 0.0);
-                let turned = Vector::new(arm.x * cos - arm.y * sin, arm.x * sin + arm.y * cos, arm.z);
-                world.bodies[strip].move_pin(*vertex, centre + turned).unwrap();
-            }
-            world.step(&mut physics);
-        }
-        let before = overlap_with_itself(&world.bodies[strip], &mesh, 0.15);
-        tip.iter().for_each(|(vertex, _)| world.bodies[strip].unpin(*vertex).unwrap());
-        world.bodies[strip].set_self_contact(true);
-        let mut fastest_ever = 0.0f64;
-        for _ in 0..240 {
-            world.step(&mut physics);
-            fastest_ever = fastest_ever.max(world.bodies[strip].max_speed());
-        }
-        let after = overlap_with_itself(&world.bodies[strip], &mesh, 0.15);
-        println!(
-            "at {height} m: {before:.1e} m deep, {after:.1e} m after 4 s, {fastest_ever:.2} m/s at the most"
-        );
-        // Of a node in a tetrahedron, whose own depth is 1 cm.
-        assert!(before > 1e-3, "it is to be in itself");
-        assert!(after < 1e-4, "still in itself");
-        assert!(fastest_ever < 5.0);
-    }
+    assert_eq!((among(pair), among(attached)), (0, 0));
 }
 
 #[test]

@@ -6,7 +6,7 @@ use foible3d::DeformableState;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 
-/// Three soft bodies, two rigid ones, one of which ties two of the soft ones together.
+/// Three soft bodies, two rigid ones, one of which two of the soft ones are attached to.
 fn scene() -> (PhysicsWorld, DeformableWorld) {
     let (mut physics, _) = world_with_floor(1.0 / 60.0);
     let mut world = DeformableWorld::new();

@@ -25,7 +25,7 @@ struct Found {
     /// Lowest centre of mass of the cube, and of the box, in units of the size.
     lowest: f64,
     lowest_box: f64,
-    /// Steps that were given up.
+    /// Steps that were rejected.
     rejected: usize,
 }
 
@@ -83,31 +83,38 @@ fn throw(c: Corner) -> Found {
     found
 }
 
-#[test]
-fn no_corner_makes_energy_or_goes_through_the_floor() {
+/// Every corner of the grid, with the place of each value among those of its kind.
+fn grid() -> Vec<(Corner, [usize; 6])> {
     let mut corners = Vec::new();
-    for e in [1e3, 1e6, 1e9] {
-        for nu in [0.0, 0.49] {
-            for dt in [1e-3, 1.0 / 60.0, 0.1] {
-                for ratio in [1e-3, 1.0, 1e3] {
-                    for iterations in [1, 10] {
-                        for speed in [0.0, 100.0] {
-                            corners.push(Corner { e, nu, dt, ratio, iterations, speed });
+    for (a, e) in [1e3, 1e6, 1e9].into_iter().enumerate() {
+        for (b, nu) in [0.0, 0.49].into_iter().enumerate() {
+            for (c, dt) in [1e-3, 1.0 / 60.0, 0.1].into_iter().enumerate() {
+                for (d, ratio) in [1e-3, 1.0, 1e3].into_iter().enumerate() {
+                    for (f, iterations) in [1, 10].into_iter().enumerate() {
+                        for (g, speed) in [0.0, 100.0].into_iter().enumerate() {
+                            corners
+                                .push((Corner { e, nu, dt, ratio, iterations, speed }, [a, b, c, d, f, g]));
                         }
                     }
                 }
             }
         }
     }
-    // Inside of the grid: where contact at the edges of the box made energy.
-    corners.push(Corner { e: 1e3, nu: 0.45, dt: 1.0 / 240.0, ratio: 0.3, iterations: 10, speed: 0.0 });
-    corners.push(Corner { e: 1e5, nu: 0.3, dt: 0.1, ratio: 300.0, iterations: 10, speed: 1.0 });
-    let thrown: Vec<Found> = corners.par_iter().map(|c| throw(*c)).collect();
+    corners
+}
+
+/// Inside of the grid: where contact at the edges of the box made energy.
+const INSIDE: [Corner; 2] = [
+    Corner { e: 1e3, nu: 0.45, dt: 1.0 / 240.0, ratio: 0.3, iterations: 10, speed: 0.0 },
+    Corner { e: 1e5, nu: 0.3, dt: 0.1, ratio: 300.0, iterations: 10, speed: 1.0 },
+];
+
+fn print_table(corners: &[Corner], thrown: &[Found]) {
     println!(
-        "| E [Pa] | ν | h [s] | rigid : soft | iterations | speed [m/s] | growth | above start | lowest cube | box | given up |"
+        "| E [Pa] | ν | h [s] | rigid : soft | iterations | speed [m/s] | growth | above start | lowest cube | box | rejected |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
-    for (c, f) in corners.iter().zip(&thrown) {
+    for (c, f) in corners.iter().zip(thrown) {
         if f.growth > 2e-3 || f.excess > 1e-6 || f.lowest < 0.0 || f.rejected > 0 {
             println!(
                 "| {:.0e} | {} | {:.4} | {:.0e} | {} | {} | {:.1e} | {:.1e} | {:.3} | {:.3} | {} |",
@@ -126,11 +133,16 @@ fn no_corner_makes_energy_or_goes_through_the_floor() {
         }
     }
     for iterations in [1, 10] {
-        let of_these = corners.iter().zip(&thrown).filter(|(c, _)| c.iterations == iterations);
+        let of_these = corners.iter().zip(thrown).filter(|(c, _)| c.iterations == iterations);
         let most = of_these.map(|(_, f)| f.growth).fold(0.0, f64::max);
         println!("growth at {iterations} iterations: at most {most:.1e}");
     }
     println!("{} corners", corners.len());
+}
+
+fn make_no_energy_and_stay_above_the_floor(corners: &[Corner]) {
+    let thrown: Vec<Found> = corners.par_iter().map(|c| throw(*c)).collect();
+    print_table(corners, &thrown);
     for (c, f) in corners.iter().zip(&thrown) {
         assert!(f.finite, "{c:?}: {f:?}");
         // A crushed cube is a film on the floor, as far below as one iteration leaves the nodes, and the box lies on it.
@@ -142,4 +154,22 @@ fn no_corner_makes_energy_or_goes_through_the_floor() {
         assert!(!carries || f.lowest > 0.0 && f.rejected == 0, "{c:?}: {f:?}");
         assert!(f.growth < if c.iterations == 1 { 2e-2 } else { 2e-3 }, "{c:?}: {f:?}");
     }
+}
+
+#[test]
+fn no_corner_of_a_spread_sixth_makes_energy_or_goes_through_the_floor() {
+    // Any two values of different kinds meet in one of these 36: of three-valued kinds the places add up to one
+    // modulo three, of two-valued ones to an even number. The softest, longest and heaviest are among them.
+    let is_kept = |[e, nu, dt, ratio, iterations, speed]: [usize; 6]| {
+        (e + dt + ratio) % 3 == 1 && (nu + iterations + speed) % 2 == 0
+    };
+    let kept = grid().into_iter().filter(|(_, places)| is_kept(*places)).map(|(corner, _)| corner);
+    make_no_energy_and_stay_above_the_floor(&kept.chain(INSIDE).collect::<Vec<_>>());
+}
+
+#[test]
+#[ignore = "slow tier"]
+fn no_corner_makes_energy_or_goes_through_the_floor() {
+    let all = grid().into_iter().map(|(corner, _)| corner);
+    make_no_energy_and_stay_above_the_floor(&all.chain(INSIDE).collect::<Vec<_>>());
 }

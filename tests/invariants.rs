@@ -117,7 +117,7 @@ fn inverted_cube_recovers() {
 }
 
 #[test]
-fn a_body_that_is_no_number_is_put_aside_and_the_rest_goes_on() {
+fn a_body_that_is_nan_is_put_aside_and_the_rest_goes_on() {
     let run = |broken: bool| {
         let (mut physics, _) = world_with_floor(1.0 / 60.0);
         let mut world = DeformableWorld::new();

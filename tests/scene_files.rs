@@ -1,7 +1,7 @@
 //! Wrong scene files and what each is answered: the line, the key, what would be right.
 
-#[allow(dead_code)]
-#[path = "../examples/scene/file.rs"]
+#[allow(dead_code, unused_imports)]
+#[path = "../examples/scene/file/mod.rs"]
 mod file;
 
 const GOOD: &str = r#"[world]
@@ -47,74 +47,75 @@ fn shipped_scenes_parse() {
     }
 }
 
+/// What of the good file is replaced by what; the line; what the answer has to say.
+const WRONG: [(&str, &str, usize, &[&str]); 27] = [
+    ("duration = 1.0", "duration = -1.0", 2, &["duration", "positive"]),
+    (
+        "[[probe]]",
+        "[[joint]]\nbetween = [\"floor\", \"bar\"]\nkind = { fixed = {} }\nanchor = [0.0, 0.0, 0.0]\n[[probe]]",
+        15,
+        &["between", "bar", "floor"],
+    ),
+    (
+        "[[probe]]",
+        "[[attach]]\ndeformable = \"cube\"\nto = \"hand\"\nregion = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }\n[[probe]]",
+        16,
+        &["to", "hand", "floor"],
+    ),
+    (
+        "[[probe]]",
+        "[[move]]\nof = \"floor\"\nduring = [0.0, 1.0]\nby = [0.0, 1.0, 0.0]\n[[probe]]",
+        15,
+        &["of", "floor", "kinematic", "none"],
+    ),
+    (
+        "[[deformable]]",
+        "[[rigid]]\nname = \"plate\"\nkind = \"kinematic\"\nshape = { ball = { radius = 1.0 } }\n[[move]]\nof = \"plate\"\nduring = [1.0, 1.0]\nby = [0.0, 1.0, 0.0]\n[[deformable]]",
+        15,
+        &["during", "1"],
+    ),
+    (
+        "[[probe]]",
+        "[[attach]]\ndeformable = \"floor\"\nto = \"floor\"\nregion = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }\n[[probe]]",
+        15,
+        &["deformable", "floor", "cube"],
+    ),
+    ("[[probe]]", "pinned = 3\n[[probe]]", 14, &["pinned", "min", "list"]),
+    ("duration = 1.0", "durations = 1.0", 2, &["durations", "duration"]),
+    ("duration = 1.0", "duration = \"long\"", 2, &["duration", "string", "number"]),
+    ("duration = 1.0", "duration = 1.0\ndt = 0.0", 3, &["dt", "positive"]),
+    ("kind = \"fixed\"", "kind = \"static\"", 6, &["static", "fixed", "dynamic", "kinematic"]),
+    ("cuboid = { half", "cubold = { half", 7, &["cubold", "cuboid"]),
+    ("half_extents = [1.0, 0.5, 1.0]", "half_extents = [1.0, 0.5]", 7, &["half_extents", "2", "3"]),
+    ("poisson_ratio = 0.3", "poisson = 0.3", 12, &["poisson", "poisson_ratio"]),
+    ("youngs_modulus = 1.0e6, ", "", 12, &["missing", "youngs_modulus"]),
+    ("poisson_ratio = 0.3", "poisson_ratio = 0.6", 12, &["material", "Poisson's ratio", "0.6", "0.4999"]),
+    ("poisson_ratio = 0.3", "poisson_ratio = 0.3, friction = -1.0", 12, &["friction", "-1", "positive"]),
+    ("cells = [2, 2, 2]", "cells = [2, 0, 2]", 11, &["body", "cells", "0"]),
+    (
+        "lattice = { half_extents = [0.2, 0.2, 0.2], cells = [2, 2, 2] }",
+        "filled = { shape = { ball = { radius = -1.0 } }, cell_size = 0.1 }",
+        11,
+        &["body", "radius", "positive", "-1"],
+    ),
+    (
+        "cuboid = { half_extents = [1.0, 0.5, 1.0] }",
+        "half_space = { normal = [0.0, 0.0, 0.0] }",
+        7,
+        &["shape", "normal", "zero"],
+    ),
+    ("name = \"cube\"", "name = \"floor\"", 10, &["floor", "unique"]),
+    ("of = \"cube\"\nnear", "of = \"sphere\"\nnear", 16, &["sphere", "of", "cube"]),
+    ("on = \"floor\"", "on = \"ceiling\"", 22, &["ceiling", "on", "floor"]),
+    ("on = \"floor\"\n", "", 20, &["force", "on"]),
+    ("quantity = \"force\"", "quantity = \"weight\"", 20, &["weight", "force", "volume_ratio"]),
+    ("within = 0.1\n", "", 20, &["equals", "within"]),
+    ("equals = 10.0", "equals = 10.0\nat = 7.0", 24, &["at", "7", "1"]),
+];
+
 #[test]
 fn wrong_files_are_answered_with_line_key_and_what_would_be_right() {
-    // What is replaced by what; the line; what the answer has to say.
-    let table: [(&str, &str, usize, &[&str]); 27] = [
-        ("duration = 1.0", "duration = -1.0", 2, &["duration", "positive"]),
-        (
-            "[[probe]]",
-            "[[joint]]\nbetween = [\"floor\", \"bar\"]\nkind = { fixed = {} }\nanchor = [0.0, 0.0, 0.0]\n[[probe]]",
-            15,
-            &["between", "bar", "floor"],
-        ),
-        (
-            "[[probe]]",
-            "[[attach]]\ndeformable = \"cube\"\nto = \"hand\"\nregion = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }\n[[probe]]",
-            16,
-            &["to", "hand", "floor"],
-        ),
-        (
-            "[[probe]]",
-            "[[move]]\nof = \"floor\"\nduring = [0.0, 1.0]\nby = [0.0, 1.0, 0.0]\n[[probe]]",
-            15,
-            &["of", "floor", "kinematic", "none"],
-        ),
-        (
-            "[[deformable]]",
-            "[[rigid]]\nname = \"plate\"\nkind = \"kinematic\"\nshape = { ball = { radius = 1.0 } }\n[[move]]\nof = \"plate\"\nduring = [1.0, 1.0]\nby = [0.0, 1.0, 0.0]\n[[deformable]]",
-            15,
-            &["during", "1"],
-        ),
-        (
-            "[[probe]]",
-            "[[attach]]\ndeformable = \"floor\"\nto = \"floor\"\nregion = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }\n[[probe]]",
-            15,
-            &["deformable", "floor", "cube"],
-        ),
-        ("[[probe]]", "pinned = 3\n[[probe]]", 14, &["pinned", "min", "list"]),
-        ("duration = 1.0", "durations = 1.0", 2, &["durations", "duration"]),
-        ("duration = 1.0", "duration = \"long\"", 2, &["duration", "string", "number"]),
-        ("duration = 1.0", "duration = 1.0\ndt = 0.0", 3, &["dt", "positive"]),
-        ("kind = \"fixed\"", "kind = \"static\"", 6, &["static", "fixed", "dynamic", "kinematic"]),
-        ("cuboid = { half", "cubold = { half", 7, &["cubold", "cuboid"]),
-        ("half_extents = [1.0, 0.5, 1.0]", "half_extents = [1.0, 0.5]", 7, &["half_extents", "2", "3"]),
-        ("poisson_ratio = 0.3", "poisson = 0.3", 12, &["poisson", "poisson_ratio"]),
-        ("youngs_modulus = 1.0e6, ", "", 12, &["missing", "youngs_modulus"]),
-        ("poisson_ratio = 0.3", "poisson_ratio = 0.6", 12, &["material", "Poisson's ratio", "0.6", "0.4999"]),
-        ("poisson_ratio = 0.3", "poisson_ratio = 0.3, friction = -1.0", 12, &["friction", "-1", "positive"]),
-        ("cells = [2, 2, 2]", "cells = [2, 0, 2]", 11, &["body", "cells", "0"]),
-        (
-            "lattice = { half_extents = [0.2, 0.2, 0.2], cells = [2, 2, 2] }",
-            "filled = { shape = { ball = { radius = -1.0 } }, cell_size = 0.1 }",
-            11,
-            &["body", "radius", "positive", "-1"],
-        ),
-        (
-            "cuboid = { half_extents = [1.0, 0.5, 1.0] }",
-            "half_space = { normal = [0.0, 0.0, 0.0] }",
-            7,
-            &["shape", "normal", "zero"],
-        ),
-        ("name = \"cube\"", "name = \"floor\"", 10, &["floor", "unique"]),
-        ("of = \"cube\"\nnear", "of = \"sphere\"\nnear", 16, &["sphere", "of", "cube"]),
-        ("on = \"floor\"", "on = \"ceiling\"", 22, &["ceiling", "on", "floor"]),
-        ("on = \"floor\"\n", "", 20, &["force", "on"]),
-        ("quantity = \"force\"", "quantity = \"weight\"", 20, &["weight", "force", "volume_ratio"]),
-        ("within = 0.1\n", "", 20, &["equals", "within"]),
-        ("equals = 10.0", "equals = 10.0\nat = 7.0", 24, &["at", "7", "1"]),
-    ];
-    for (right, wrong, line, says) in table {
+    for (right, wrong, line, says) in WRONG {
         assert!(GOOD.contains(right), "{right}");
         let answer = file::parse(&GOOD.replacen(right, wrong, 1)).unwrap_err();
         println!("{wrong:?} → {answer}\n");

@@ -154,7 +154,7 @@ fn a_tower_of_soft_and_rigid_boxes_ends_asleep() {
 
 #[test]
 fn bodies_tied_to_one_another_wake_together() {
-    // Two slabs tied end to end, the first over a support that the second does not touch.
+    // Two slabs attached end to end, the first over a support that the second does not touch.
     let mut physics = PhysicsWorld::new();
     let support = RigidBodyBuilder::fixed().translation(Vector::new(-0.1, -0.55, 0.0));
     let support = physics.insert(support, ColliderBuilder::cuboid(0.21, 0.5, 0.1)).0;
@@ -164,18 +164,18 @@ fn bodies_tied_to_one_another_wake_together() {
             .material(DeformableMaterial::new(1e6, 0.3).mass_damping(5.0))
     };
     let held = world.insert(slab().translation(Vector::X).pinned(|x| x.x > 0.79)).unwrap();
-    let tied = world.insert(slab().translation(Vector::X * 0.6).pinned(|x| x.x < -10.0)).unwrap();
+    let middle = world.insert(slab().translation(Vector::X * 0.6).pinned(|x| x.x < -10.0)).unwrap();
     let far = world.insert(slab().translation(Vector::ZERO)).unwrap();
     let end = |b: DeformableBodyHandle, side: f64, world: &DeformableWorld| {
         at_rest_where(&world.bodies[b], |x| x[0] * side > 0.199)
     };
-    let (a, b) = (end(tied, 1.0, &world), end(held, -1.0, &world));
-    let (c, d) = (end(far, 1.0, &world), end(tied, -1.0, &world));
-    world.bodies.attach(tied, &a, AttachTo::Deformable(held, b)).unwrap();
-    world.bodies.attach(far, &c, AttachTo::Deformable(tied, d)).unwrap();
+    let (a, b) = (end(middle, 1.0, &world), end(held, -1.0, &world));
+    let (c, d) = (end(far, 1.0, &world), end(middle, -1.0, &world));
+    world.bodies.attach(middle, &a, AttachTo::Deformable(held, b)).unwrap();
+    world.bodies.attach(far, &c, AttachTo::Deformable(middle, d)).unwrap();
     (0..600).for_each(|_| world.step(&mut physics));
-    assert!([held, tied, far].iter().all(|h| world.bodies[*h].is_sleeping()));
+    assert!([held, middle, far].iter().all(|h| world.bodies[*h].is_sleeping()));
     physics.remove_body(support);
     world.step(&mut physics);
-    assert!([held, tied, far].iter().all(|h| !world.bodies[*h].is_sleeping()));
+    assert!([held, middle, far].iter().all(|h| !world.bodies[*h].is_sleeping()));
 }

@@ -1,4 +1,4 @@
-//! The ladder of solvers: all come to the solution of Newton's method, at their own pace.
+//! Solvers: all come to the solution of Newton's method, at their own pace.
 mod common;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
@@ -119,7 +119,7 @@ fn every_solver_rests_on_the_floor_with_its_weight_under_a_box() {
 
 #[test]
 fn every_solver_holds_a_box_by_an_attachment() {
-    // A beam pinned at one end, a box tied to the other. Sweeps and diagonals take hundreds of iterations for what
+    // A beam pinned at one end, a box attached to the other. Sweeps and diagonals take hundreds of iterations for what
     // the others do in five.
     for solver in SOLVERS.into_iter().chain([Solver::Newton]) {
         let mut physics = PhysicsWorld::new();
@@ -135,16 +135,16 @@ fn every_solver_holds_a_box_by_an_attachment() {
         let (load, _) = physics.insert(load, ColliderBuilder::cuboid(0.08, 0.08, 0.08).density(1500.0));
         let end = world.bodies[beam].vertices_where(|x| x.x > 0.299);
         let on = AttachTo::RigidBody(load, *physics.bodies[load].position());
-        let tie = world.bodies.attach(beam, &end, on).unwrap();
+        let attachment = world.bodies.attach(beam, &end, on).unwrap();
         for _ in 0..600 {
             world.step(&mut physics);
         }
         let weight = f64::from(physics.bodies[load].mass()) * common::G;
-        let force = f64::from(world.bodies.attachment(tie).unwrap().force().y);
+        let force = f64::from(world.bodies.attachment(attachment).unwrap().force().y);
         let body = &world.bodies[beam];
         let held = body.pin_force()[1] / (weight + body.mass() * common::G);
         println!(
-            "{solver:?}: tie {:.6} of the weight, pins {held:.6}, {:.1e} m/s",
+            "{solver:?}: attachment {:.6} of the weight, pins {held:.6}, {:.1e} m/s",
             -force / weight,
             body.max_speed()
         );

@@ -1,4 +1,4 @@
-//! What accuracy costs: every method of the ladder of solvers over a set of scenes, against Newton's method and
+//! What accuracy costs: every solver and preset over a set of scenes, against Newton's method and
 //! rapier's own soft bodies. `cargo bench --bench trade`; `-- NAME` for the scenes of
 //! that name alone, or the tables of `presets` or `steps`; `-- plot` draws `target/trade.csv` again without a run.
 //!

@@ -1,4 +1,4 @@
-//! The methods of the ladder: presets, and each solver by iterations.
+//! The methods: presets, and each solver by iterations.
 
 use crate::scenes::{Kind, Scene};
 use foible3d::prelude::*;

@@ -12,42 +12,12 @@ pub const SETTINGS: [&str; 2] = ["default", "fem tuned"];
 
 /// `None` for what a solver is not made for: the implicit one is of solids.
 pub fn run(scene: &Scene, setting: &str) -> Option<Record> {
-    let is_fem = setting != "default";
     if let Kind::Grasp { cells } = scene.kind {
         return Some(run_grasp(scene, cells, setting));
     }
+    let (builder, rest) = builder(scene, setting)?;
     let mut physics = scene.world();
     tune(&mut physics, setting);
-    let (builder, rest) = match scene.kind {
-        Kind::Bar { half, cells, .. } => {
-            let mesh = TetMesh::cuboid(half, cells).ok()?;
-            let held = |v: &u32| mesh.vertices()[*v as usize][0] < -half[0] + 1e-6;
-            let pinned = (0..mesh.vertices().len() as u32).filter(held);
-            let builder = solid(scene, &mesh, Vector::ZERO, setting).pinned_particles(pinned);
-            (builder.no_surface_collider(), mesh.vertices().to_vec())
-        }
-        Kind::Drop { cells } => {
-            let mesh = TetMesh::cuboid([0.2; 3], [cells; 3]).ok()?;
-            let builder = solid(scene, &mesh, Vector::Y * 0.5, setting);
-            (builder.surface_collider(skin(0.5)), mesh.vertices().to_vec())
-        }
-        Kind::Cloth { cells } if !is_fem => {
-            let (edge, n) = (1.0 / cells as f32, cells + 1);
-            let origin = Vector::new(-0.5, 0.0, -0.5);
-            let builder = SoftBodyBuilder::cloth(origin, Vector::X * edge, Vector::Z * edge, n, n);
-            let mass = scene.material.density as f32 * 1e-3 / (n * n) as f32;
-            // Particle (i, j) is number i n + j: the corners of least z.
-            let builder = builder.particle_mass(mass).pinned_particles([0, (cells * n) as u32]);
-            thin(scene, builder)
-        }
-        Kind::Rope { segments } if !is_fem => {
-            let builder = SoftBodyBuilder::rope(Vector::ZERO, Vector::X, segments + 1);
-            let volume = std::f32::consts::PI * 2e-3 * 2e-3;
-            let mass = scene.material.density as f32 * volume / (segments + 1) as f32;
-            thin(scene, builder.particle_mass(mass).pinned_particles([0]))
-        }
-        _ => return None,
-    };
     let body = physics.insert_soft_body(builder);
     let watched: Vec<usize> = (0..rest.len()).filter(|&v| scene.watches(rest[v])).collect();
     if let Kind::Bar { twist, pull, .. } = scene.kind {
@@ -82,6 +52,41 @@ pub fn run(scene: &Scene, setting: &str) -> Option<Record> {
         }
     }
     Some(record)
+}
+
+/// The soft body of a scene, and its particles at rest.
+fn builder(scene: &Scene, setting: &str) -> Option<(SoftBodyBuilder, Vec<[f64; 3]>)> {
+    let is_fem = setting != "default";
+    Some(match scene.kind {
+        Kind::Bar { half, cells, .. } => {
+            let mesh = TetMesh::cuboid(half, cells).ok()?;
+            let held = |v: &u32| mesh.vertices()[*v as usize][0] < -half[0] + 1e-6;
+            let pinned = (0..mesh.vertices().len() as u32).filter(held);
+            let builder = solid(scene, &mesh, Vector::ZERO, setting).pinned_particles(pinned);
+            (builder.no_surface_collider(), mesh.vertices().to_vec())
+        }
+        Kind::Drop { cells } => {
+            let mesh = TetMesh::cuboid([0.2; 3], [cells; 3]).ok()?;
+            let builder = solid(scene, &mesh, Vector::Y * 0.5, setting);
+            (builder.surface_collider(skin(0.5)), mesh.vertices().to_vec())
+        }
+        Kind::Cloth { cells } if !is_fem => {
+            let (edge, n) = (1.0 / cells as f32, cells + 1);
+            let origin = Vector::new(-0.5, 0.0, -0.5);
+            let builder = SoftBodyBuilder::cloth(origin, Vector::X * edge, Vector::Z * edge, n, n);
+            let mass = scene.material.density as f32 * 1e-3 / (n * n) as f32;
+            // Particle (i, j) is number i n + j: the corners of least z.
+            let builder = builder.particle_mass(mass).pinned_particles([0, (cells * n) as u32]);
+            thin(scene, builder)
+        }
+        Kind::Rope { segments } if !is_fem => {
+            let builder = SoftBodyBuilder::rope(Vector::ZERO, Vector::X, segments + 1);
+            let volume = std::f32::consts::PI * 2e-3 * 2e-3;
+            let mass = scene.material.density as f32 * volume / (segments + 1) as f32;
+            thin(scene, builder.particle_mass(mass).pinned_particles([0]))
+        }
+        _ => return None,
+    })
 }
 
 fn tune(physics: &mut PhysicsWorld, setting: &str) {

@@ -112,8 +112,9 @@ fn polyline(points: &[[f32; 3]], segments: usize) -> Vec<Vector> {
     (0..=segments).map(|k| at(total * k as f32 / segments.max(1) as f32)).collect()
 }
 
-fn deformable(body: &file::Deformable, folder: &Path) -> DeformableBodyBuilder {
-    let builder = match body.body.as_ref() {
+/// The shape of a deformable.
+fn mesh(body: &Body, folder: &Path) -> DeformableBodyBuilder {
+    match body {
         Body::Lattice { half_extents, cells } => {
             DeformableBodyBuilder::cuboid((*half_extents).into(), *cells)
         }
@@ -134,16 +135,19 @@ fn deformable(body: &file::Deformable, folder: &Path) -> DeformableBodyBuilder {
                 Err(_) => DeformableBodyBuilder::cuboid((*half_extents).into(), *cells),
             }
         }
-    };
-    let builder = match body.solver.fidelity {
+    }
+}
+
+/// The preset of a body, changed by the other keys of its solver.
+fn solved_by(builder: DeformableBodyBuilder, asked: &file::Solver) -> DeformableBodyBuilder {
+    let builder = match asked.fidelity {
         Some(file::Fidelity::Preview) => builder.fidelity(Fidelity::Preview),
         Some(file::Fidelity::Game) => builder.fidelity(Fidelity::Game),
         Some(file::Fidelity::Engineering) => builder.fidelity(Fidelity::Engineering),
         Some(file::Fidelity::Reference) => builder.fidelity(Fidelity::Reference),
         None => builder,
     };
-    let asked = &body.solver;
-    let builder = builder.tune(|settings| {
+    builder.tune(|settings| {
         if let Some(kind) = asked.kind {
             settings.solver = match kind {
                 file::SolverKind::Projective => Solver::Projective,
@@ -173,7 +177,11 @@ fn deformable(body: &file::Deformable, folder: &Path) -> DeformableBodyBuilder {
             Some(window) => Acceleration::Lbfgs { window },
             None => settings.acceleration,
         };
-    });
+    })
+}
+
+fn deformable(body: &file::Deformable, folder: &Path) -> DeformableBodyBuilder {
+    let builder = solved_by(mesh(body.body.as_ref(), folder), &body.solver);
     let builder = builder
         .pose(pose(body.translation, body.rotation))
         .linvel(body.linvel.into())
@@ -230,7 +238,7 @@ impl Stage {
         Ok(())
     }
 
-    /// Ties a deformable to a rigid body; names were checked with the file.
+    /// Attaches a deformable to a rigid body; names were checked with the file.
     fn attach(&mut self, attach: &file::Attach) -> Result<(), String> {
         let soft = self.deformable.iter().find(|(name, _)| name == attach.deformable.as_ref());
         let rigid = self.rigid.iter().find(|(name, ..)| name == attach.to.as_ref());

@@ -107,7 +107,7 @@ fn run(path: &Path, out: &Path) -> Result<usize, String> {
 
 fn verdict(expect: &file::Expect, value: f64) -> bool {
     let near = |wanted: f64| (value - wanted).abs() <= expect.within.unwrap_or(0.0);
-    // A NaN meets nothing.
+    // NaN meets no expectation.
     let met = expect.equals.is_none_or(near)
         && expect.at_most.is_none_or(|limit| value <= limit)
         && expect.at_least.is_none_or(|limit| value >= limit);

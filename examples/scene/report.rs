@@ -152,6 +152,11 @@ pub fn print_table(scene: &Scene, stage: &Stage, trace: &Trace) {
         let m = |q| stage.measure(q, name, None);
         println!("  {name:<14} {:>10.5} {:>11.2e}  (probe)", m(Quantity::Y), m(Quantity::Speed));
     }
+    print_costs(trace);
+}
+
+/// Milliseconds, iterations and residual per step: the median and the worst.
+fn print_costs(trace: &Trace) {
     println!(
         "\n  {:<10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>11}",
         "per step", "detect", "factor", "solve", "advance", "total ms", "iter.", "residual N"

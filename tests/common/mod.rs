@@ -2,6 +2,8 @@
 #![allow(dead_code)]
 
 pub mod newton;
+pub mod soft_bodies;
+pub mod thin;
 
 use foible3d::prelude::*;
 use rapier3d::prelude::*;

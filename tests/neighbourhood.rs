@@ -250,7 +250,7 @@ fn an_arm_presses_a_pad_with_its_motors_torque() {
     assert!(speed < 1e-3, "{speed:e}");
 }
 
-/// A box with a soft cube tied to its upper side, thrown onto the floor.
+/// A box with a soft cube attached to its upper side, thrown onto the floor.
 fn throw_with_a_cube(
     groups: InteractionGroups,
     restitution: f32,

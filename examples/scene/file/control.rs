@@ -1,0 +1,44 @@
+//! What holds bodies and what moves them.
+
+use super::{Region, Vec3};
+use serde::Deserialize;
+use toml::Spanned;
+
+/// Surface vertices of a deformable in a box of the world, held by a rigid body where they are at the start.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Attach {
+    pub deformable: Spanned<String>,
+    pub to: Spanned<String>,
+    pub region: Region,
+}
+
+/// How a kinematic body moves beside its velocities: smoothly by a vector, or to and fro by it.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Move {
+    pub of: Spanned<String>,
+    /// Begin and end [s].
+    pub during: Spanned<[f32; 2]>,
+    pub by: Vec3,
+    /// Periods to and fro; comes back to where it was then.
+    pub swings: Option<u32>,
+}
+
+impl Move {
+    /// Share of `by` at a time [s].
+    pub fn share(&self, time: f32) -> f32 {
+        let [begin, end] = *self.during.as_ref();
+        let smooth = |t: f32| t.clamp(0.0, 1.0).powi(2) * (3.0 - 2.0 * t.clamp(0.0, 1.0));
+        let along = ((time - begin) / (end - begin)).clamp(0.0, 1.0);
+        match self.swings {
+            None => smooth(along),
+            // The first and the last period swell and fade.
+            Some(swings) => {
+                let turns = along * swings as f32;
+                let swell = smooth(turns.min(swings as f32 - turns));
+                swell * (std::f32::consts::TAU * turns).sin()
+            }
+        }
+    }
+}
