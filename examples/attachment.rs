@@ -14,7 +14,7 @@ fn main() -> Result<(), DeformableBodyError> {
     let body = RigidBodyBuilder::dynamic().translation(Vector::NEG_Y * 0.1).can_sleep(false);
     let (load, _) = physics.insert(body, ColliderBuilder::cuboid(0.1, 0.1, 0.1).density(1000.0));
 
-    // A strap of rubber, 4 cm × 1 cm × 50 cm, pinned at its upper end and tied to the box at its lower.
+    // A strap of rubber, 4 cm × 1 cm × 50 cm, pinned at its upper end and attached to the box at its lower.
     let rubber = DeformableMaterial::new(5.0e6, 0.3).density(1100.0).mass_damping(5.0);
     let strap = DeformableBodyBuilder::cuboid(Vector::new(0.02, 0.25, 0.005), [2, 25, 1])
         .translation(Vector::Y * 0.25)

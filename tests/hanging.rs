@@ -206,7 +206,7 @@ fn a_plate_with_a_soft_cube_hangs_on_three_ropes_or_springs() {
     }
 }
 
-/// A box of 8 kg, with as heavy a soft cube tied over its upper side, across a gap \[m\], if it is to have one.
+/// A box of 8 kg, with as heavy a soft cube attached over its upper side, across a gap \[m\], if it is to have one.
 fn carrier(physics: &mut PhysicsWorld, at: Vector, gap: Option<f32>) -> (DeformableWorld, RigidBodyHandle) {
     physics.integration_parameters.dt = H;
     let shape = ColliderBuilder::cuboid(0.1, 0.1, 0.1).density(1000.0);

@@ -269,8 +269,8 @@ fn a_hinge_at_its_limit_balances_the_moment_of_a_soft_load() {
     assert!(angle.abs() < 1e-6 && gap < 1e-6, "{angle:e} rad, {gap:e} m");
 }
 
-/// The bar at an angle, with the cube tied to it, if it is to have it, or by rapier alone.
-fn tied_bar(angle: f32, gravity: Vector, hinge: RevoluteJointBuilder, soft: bool) -> Tied {
+/// The bar at an angle, with the cube attached to it, if it is to have it, or by rapier alone.
+fn attached_bar(angle: f32, gravity: Vector, hinge: RevoluteJointBuilder, soft: bool) -> Attached {
     let mut physics = PhysicsWorld::new();
     physics.gravity = gravity;
     let (bar, joint) = hinged_bar(&mut physics, angle, hinge);
@@ -280,10 +280,10 @@ fn tied_bar(angle: f32, gravity: Vector, hinge: RevoluteJointBuilder, soft: bool
         let at = physics.bodies[bar].position().transform_point(Vector::new(0.3, 0.16, 0.0));
         tie(&mut world, &physics, small_cube(at).rotation(Vector::Z * angle), bar);
     }
-    Tied { physics, world, bar, joint: SolvedJoint::Impulse(joint) }
+    Attached { physics, world, bar, joint: SolvedJoint::Impulse(joint) }
 }
 
-struct Tied {
+struct Attached {
     physics: PhysicsWorld,
     world: DeformableWorld,
     bar: RigidBodyHandle,
@@ -295,7 +295,8 @@ struct Tied {
 fn a_hinge_with_limits_across_half_a_turn_rests_on_its_upper_limit() {
     for soft in [false, true] {
         let hinge = RevoluteJointBuilder::new(Vector::Z).limits([2.8, 3.4]);
-        let Tied { mut physics, mut world, bar, joint } = tied_bar(3.3, Vector::Y * -9.81, hinge, soft);
+        let Attached { mut physics, mut world, bar, joint } =
+            attached_bar(3.3, Vector::Y * -9.81, hinge, soft);
         let [limit, moment, angle] = rest(&mut physics, &mut world, 300, |physics, world| {
             let [angle, _] = hinge_of(physics, bar);
             let limit = world.joint_force(joint, 3);
@@ -318,7 +319,7 @@ fn a_hinge_with_limits_across_half_a_turn_rests_on_its_upper_limit() {
 fn a_hinge_is_driven_across_half_a_turn_with_a_soft_load() {
     for (soft, model) in [false, true].into_iter().flat_map(|soft| models().map(|(model, _)| (soft, model))) {
         let hinge = RevoluteJointBuilder::new(Vector::Z).motor_model(model).motor_position(3.3, 400.0, 100.0);
-        let Tied { mut physics, mut world, bar, .. } = tied_bar(3.0, Vector::ZERO, hinge, soft);
+        let Attached { mut physics, mut world, bar, .. } = attached_bar(3.0, Vector::ZERO, hinge, soft);
         let [angle] = rest(&mut physics, &mut world, 420, |physics, _| {
             [hinge_of(physics, bar)[0].rem_euclid(std::f64::consts::TAU)]
         });

@@ -7,7 +7,7 @@ use crate::error::{BodyError, DeformableBodyError};
 use crate::math::Pose64;
 
 impl DeformableBodySet {
-    /// Ties surface vertices of a body to something, where they are now.
+    /// Attaches surface vertices of a body to something, where they are now.
     ///
     /// ```
     /// use foible3d::prelude::*;
@@ -35,7 +35,7 @@ impl DeformableBodySet {
     /// # Errors
     /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody); [`BodyError::NoSuchVertex`];
     /// [`BodyError::NotOnSurface`] for vertices inside of a body, which can be pinned but not attached;
-    /// [`BodyError::NoVertices`]; [`BodyError::NotFinite`] for a pose that is no number; [`BodyError::WrongSize`] if the two lists of vertices differ in length.
+    /// [`BodyError::NoVertices`]; [`BodyError::NotFinite`] for a pose that is not finite; [`BodyError::WrongSize`] if the two lists of vertices differ in length.
     pub fn attach(
         &mut self,
         body: DeformableBodyHandle,

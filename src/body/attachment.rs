@@ -1,11 +1,11 @@
-//! Vertices tied to rigid bodies, to the world, or to other deformable bodies.
+//! Vertices attached to rigid bodies, to the world, or to other deformable bodies.
 
 use super::handle::{DeformableAttachmentHandle, DeformableBodyHandle};
 use crate::math::{Pose64, Vec3, to_real};
 use rapier3d::dynamics::RigidBodyHandle;
 use rapier3d::math::{Pose, Vector};
 
-/// What vertices are tied to.
+/// What vertices are attached to.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum AttachTo {
@@ -17,7 +17,7 @@ pub enum AttachTo {
     Deformable(DeformableBodyHandle, Vec<usize>),
 }
 
-/// Vertices of a body tied to something. Hard, unless given a compliance.
+/// Vertices of a body attached to something. Hard, unless given a compliance.
 #[derive(Clone, Debug)]
 pub struct DeformableAttachment {
     pub(crate) body: DeformableBodyHandle,
@@ -35,7 +35,7 @@ pub struct DeformableAttachment {
     rigid_pose: Option<Pose64>,
 }
 
-/// Where the nodes are tied.
+/// Where the nodes are attached.
 #[derive(Clone, Debug)]
 pub(crate) enum Anchors {
     World(Vec<Vec3>),
@@ -72,11 +72,11 @@ impl DeformableAttachment {
     }
 
     /// Whether it is of this body, or to it.
-    pub(super) fn ties(&self, body: DeformableBodyHandle) -> bool {
+    pub(super) fn involves(&self, body: DeformableBodyHandle) -> bool {
         self.bodies().contains(&Some(body))
     }
 
-    /// The deformable bodies that it ties.
+    /// The deformable bodies that it is of and to.
     pub(crate) fn bodies(&self) -> [Option<DeformableBodyHandle>; 2] {
         let other = match self.anchors {
             Anchors::Deformable(other, _) => Some(other),
@@ -85,7 +85,7 @@ impl DeformableAttachment {
         [Some(self.body), other]
     }
 
-    /// The body whose vertices are tied.
+    /// The body whose vertices are attached.
     pub fn body(&self) -> DeformableBodyHandle {
         self.body
     }
@@ -101,12 +101,12 @@ impl DeformableAttachment {
         self.changed = true;
     }
 
-    /// How far the vertices may go from their places \[m\]; zero ties them there.
+    /// How far the vertices may go from their places \[m\]; zero keeps them there.
     pub fn length(&self) -> f64 {
         self.length
     }
 
-    /// Makes cables of the ties, of this length \[m\]: they hold the vertices within it and push nothing. Without
+    /// Makes cables of the attachment, of this length \[m\]: they hold the vertices within it and push nothing. Without
     /// a compliance they do not stretch, whatever they carry. Negative values and NaN are taken for zero.
     pub fn set_length(&mut self, length: f64) {
         self.length = length.max(0.0);
@@ -134,14 +134,14 @@ impl DeformableAttachment {
         self.broken
     }
 
-    /// Makes a broken attachment whole.
+    /// Mends a broken attachment.
     pub fn mend(&mut self) {
         self.broken = false;
         self.changed = true;
     }
 
     /// Moves the places in the world, or on the rigid body in its frame, by `by` \[m\]. Does nothing to
-    /// attachments between deformable bodies, nor with a vector that is no number.
+    /// attachments between deformable bodies, nor with a vector that is not finite.
     pub fn translate(&mut self, by: Vector) {
         if !by.is_finite() {
             return;
@@ -154,22 +154,22 @@ impl DeformableAttachment {
         }
     }
 
-    /// The bodies that it ties, if something was changed since this was asked last.
+    /// The bodies that it is of and to, if something was changed since this was asked last.
     pub(crate) fn take_changed(&mut self) -> [Option<DeformableBodyHandle>; 2] {
         if std::mem::take(&mut self.changed) { self.bodies() } else { [None; 2] }
     }
 
-    /// Whether it holds its nodes exactly where they are tied.
+    /// Whether it keeps its nodes exactly where they are attached.
     pub(crate) fn is_hard(&self) -> bool {
         !self.broken && self.compliance == 0.0 && self.length == 0.0
     }
 
-    /// Takes in where its rigid body is now; true if that is not where it was.
+    /// Notes where its rigid body is now; true if that is not where it was.
     pub(crate) fn notice(&mut self, pose: Option<Pose64>) -> bool {
         std::mem::replace(&mut self.rigid_pose, pose) != pose
     }
 
-    /// The rigid body that it ties to.
+    /// The rigid body that it is to.
     pub(crate) fn rigid(&self) -> Option<RigidBodyHandle> {
         match self.anchors {
             Anchors::Rigid(handle, _) => Some(handle),
@@ -177,7 +177,7 @@ impl DeformableAttachment {
         }
     }
 
-    /// Takes in the force of a step.
+    /// Breaks under the force of a step, if that is too large.
     pub(crate) fn end_step(&mut self) {
         if !self.broken && self.force.norm() > self.break_force {
             self.broken = true;

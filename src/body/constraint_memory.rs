@@ -140,14 +140,14 @@ impl ConstraintKey {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ConstraintMemory {
     pub key: ConstraintKey,
-    /// Force on the body \[N\], in the world.
+    /// Force on endpoint 0 \[N\], in the world.
     pub force: Vec3,
     /// De Saxcé shift μ‖slip‖ \[m\] over the step, per second of it [m/s].
     pub shift_rate: f64,
     pub geometry: ConstraintGeometry,
 }
 
-/// Where a contact acts: what its rows in the matrix of the contact problem are made of. While it is
+/// Where a contact acts: what its part of the Delassus operator is made of. While it is
 /// nearly what it was, the next step takes it as it was: at rest, where rapier's poses differ in their last
 /// digits from step to step, the matrix then stays the same to the last bit and need not be made again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -56,7 +56,7 @@ impl DeformableBody {
         self.activation
     }
 
-    /// Sets the stretch that muscle fibres want to have; brought into 0 to 10, one if it is no number.
+    /// Sets the stretch that muscle fibres want to have; brought into 0 to 10, one if it is NaN.
     pub fn set_activation(&mut self, stretch: f64) {
         self.wake_up();
         self.activation = if stretch.is_nan() { 1.0 } else { stretch.clamp(0.0, 10.0) };

@@ -18,7 +18,7 @@ impl DeformableBody {
         self.report.residual <= self.report.tolerance
     }
 
-    /// Whether the last step was given up: what was found of it would have made energy, as where a body is pinched to a
+    /// Whether the last step was rejected: what was found of it would have made energy, as where a body is pinched to a
     /// film, or strained it by what it ran into. The body has kept its shape and moved as a rigid one; a pinned
     /// one has stayed where it was.
     pub fn last_step_rejected(&self) -> bool {
@@ -26,7 +26,7 @@ impl DeformableBody {
     }
 
     /// How often the last step had to be done again because it would have raised the energy: without the quasi-Newton
-    /// update, or with a scaled metric.
+    /// update, or with a damped preconditioner.
     pub fn last_guard_retries(&self) -> usize {
         self.report.guard_retries
     }

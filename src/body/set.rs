@@ -98,7 +98,7 @@ impl DeformableBodySet {
     /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody).
     pub fn remove(&mut self, handle: DeformableBodyHandle) -> Result<DeformableBody, DeformableBodyError> {
         let body = self.bodies.remove(handle.0);
-        self.attachments.retain(|_, attachment| !attachment.ties(handle));
+        self.attachments.retain(|_, attachment| !attachment.involves(handle));
         body.ok_or_else(|| handle.no_such_body().into())
     }
 

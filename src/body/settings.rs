@@ -49,7 +49,7 @@ pub enum Integrator {
     ImplicitEuler,
     /// The backward differentiation formula of second order, `x = (4xₙ − xₙ₋₁)/3 + 2h/3·v` [Hairer & Wanner
     /// 1996], with a constant matrix of its own. Keeps vibrations that implicit Euler damps out. A body that
-    /// touches something, is tied to something, or was moved, pinned or let go by its user takes steps of
+    /// touches something, is attached to something, or was moved, pinned or let go by its user takes steps of
     /// implicit Euler until it has been free for one. Pins may stay, and be led.
     Bdf2,
 }
@@ -103,7 +103,7 @@ impl Default for Acceleration {
 }
 
 /// How much truth a body is solved for: settings for those who do not want to choose. What each costs and how
-/// far it is off is measured in the README.
+/// far it is off is measured in `docs/accuracy.md`.
 ///
 /// ```
 /// use foible3d::prelude::*;
@@ -170,7 +170,7 @@ impl Fidelity {
 }
 
 /// How hard a body is solved. The defaults were chosen from measured error-against-time curves, see
-/// the README. Setters chain from [`SolverSettings::default`] or [`SolverSettings::iterations`];
+/// `docs/accuracy.md`. Setters chain from [`SolverSettings::default`] or [`SolverSettings::iterations`];
 /// [`DeformableBodyBuilder::fidelity`](super::DeformableBodyBuilder::fidelity) and
 /// [`tune`](super::DeformableBodyBuilder::tune) begin from what suits the body.
 ///
@@ -211,7 +211,7 @@ pub struct SolverSettings {
     pub integrator: Integrator,
     /// Whether a body in free flight keeps its spin. Implicit Euler loses it, 42 % in a second at 10 rad/s and
     /// steps of 1/100 s: what it lost is given back after the step, as a rotation of the velocities. On by
-    /// default; a body that is held, or touched by anything, is left alone.
+    /// default; a body that is pinned, attached or touched is left alone.
     pub keeps_spin: bool,
 }
 

@@ -14,7 +14,7 @@ pub struct DeformableState {
     pub(crate) v: Vec<Vec3>,
     /// Contacts of the last step, ascending by key: warm starts of the next.
     pub(crate) contacts: Vec<ConstraintMemory>,
-    /// What held the rigid bodies of the island in the last step, ascending by key; with the first body
+    /// Constraints of the rigid neighbourhood and of attachments in the last step, ascending by key; with the first body
     /// of the island.
     pub(crate) shared: Vec<ConstraintMemory>,
     /// Where the last step began, of bodies that go forward by two.
@@ -22,7 +22,7 @@ pub struct DeformableState {
     pub(crate) sleep: Sleep,
 }
 
-/// The state before the last step; empty where there is none to go on from.
+/// The state before the last step; empty where no step can go on from it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct History {
     /// Length of the step \[s\].
@@ -65,7 +65,7 @@ impl Surroundings {
     }
 }
 
-/// Farther than this [m], or faster [m/s], is no number to rapier: its `f32` overflows in squares.
+/// Farther than this [m], or faster [m/s], overflows in squares of rapier's `f32`.
 const FARTHEST: f64 = 1.0e15;
 
 /// Whether a position or velocity is one that a step can go on from.
@@ -85,7 +85,7 @@ impl DeformableState {
         place.ok().map(|i| &self.contacts[i])
     }
 
-    /// The row between rigid bodies of the last step with this key.
+    /// The shared constraint of the last step with this key.
     pub(crate) fn shared_memory(&self, key: &ConstraintKey) -> Option<&ConstraintMemory> {
         let place = self.shared.binary_search_by(|c| c.key.cmp(key));
         place.ok().map(|i| &self.shared[i])

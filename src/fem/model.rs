@@ -88,7 +88,7 @@ impl DeformableModel {
     }
 
     /// The same with muscle fibres in its tetrahedra: `direction` tells their direction at a point of the rest
-    /// shape \[m\]; where that is zero or no number there are none. See
+    /// shape \[m\]; where that is zero or not finite there are none. See
     /// [`DeformableMaterial::fibre_modulus`](crate::DeformableMaterial::fibre_modulus).
     #[must_use]
     pub fn with_fibres(mut self, direction: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
@@ -108,7 +108,7 @@ impl DeformableModel {
     /// The same with its tetrahedra smoothed over their edges and nodes [Liu et al. 2009; He et al. 2013]: they do not
     /// lock, in bending and near incompressibility, as linear tetrahedra do, whose stiffness falls to the
     /// true one only with the mesh. Elements cost three times as much, and the factor is twice as large:
-    /// worth it wherever the mesh is coarse. What it gains is in the README.
+    /// worth it wherever the mesh is coarse. What it gains is in `docs/accuracy.md`.
     #[must_use]
     pub fn smoothed(mut self) -> Self {
         if !self.is_solid() {

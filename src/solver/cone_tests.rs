@@ -308,7 +308,7 @@ proptest! {
         let mut numbers = Numbers(seed);
         let case = Case::new(groups, bodies, &ENDS, &mut numbers);
         let problem = &case.dense;
-        // Near enough that the centre stays λ⁰: the ladder would move it.
+        // Near enough that the centre stays λ⁰: continuation would move it.
         let start: Vec<f64> = case.solution.iter().map(|l| l * numbers.between(0.99, 1.0)).collect();
         let (mut lambda, mut product) = (start.clone(), Vec::new());
         problem.multiply(&lambda, &mut product);
@@ -316,7 +316,7 @@ proptest! {
         let mut solver = ConeSolver::default();
         solver.predict(problem, &case.points(), &vec![0.0; problem.contacts()], |_| 0.1);
         let work = solver.solve(problem, &mut lambda, &mut product, TOLERANCE);
-        // The warm start has done it: with the ladder it would be a jump, and at least one step for each of its ends.
+        // The warm start has done it: with continuation it would be a predictor step, and at least one step for each of its ends.
         prop_assume!(work.newton_steps <= 2);
         // λ = P(λ⁰ − (g + Wλ)/R).
         let mut residual = 0.0f64;

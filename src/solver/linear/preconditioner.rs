@@ -1,6 +1,6 @@
 //! The preconditioner of the global step: `P = Q A⁻¹ Qᵀ` with rotating frames Q around the constant factor.
 //!
-//! One frame per node does not know that the body as a whole may be pushed without strain. That
+//! One frame per node does not know that the whole body may be pushed without strain. That
 //! mode is put back exactly: with masses m_i (total m), 1 the rigid translation,
 //! `P = (I − 1mᵀ/m) P₀ (I − m1ᵀ/m) + h²/(1 + αh)/m · 11ᵀ`.
 //!

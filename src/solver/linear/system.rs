@@ -136,7 +136,7 @@ pub(crate) fn in_single_precision(
     }
 }
 
-/// An estimate: the largest row sum over what a body moving as a whole meets, the mean inertia.
+/// An estimate: the largest row sum over what a rigidly moving body meets, the mean inertia.
 fn condition(body: &DeformableBody, h: f64, symbolic: &Symbolic, values: &[f64]) -> f64 {
     let starts = symbolic.column_starts();
     let mut sums = vec![0.0; starts.len() - 1];
