@@ -119,8 +119,9 @@ fn polished(d: &Vec3, sigma: &Vec3) -> Vec3 {
     let across = inner * normal;
     let change = (normal.dot(&(inner * residual)) - (1.0 - product)) / normal.dot(&across);
     let next = d + inner * residual - across * change;
-    // Written so that a NaN step is not taken.
-    if (next - d).amax() < 1e-6 { next } else { *d }
+    // Written so that a NaN step is not taken. A step of 1e-6 leaves its square of the product: where two nearest points
+    // are about to be one, the first step was not the last.
+    if (next - d).amax() < 1e-6 { next / next.product().cbrt() } else { *d }
 }
 
 #[cfg(test)]
