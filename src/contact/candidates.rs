@@ -104,7 +104,7 @@ mod tests {
                 let mut end = start;
                 end.translation.x += if moves { 0.5 } else { 0.0 };
                 let shape = if i == 7 { SharedShape::halfspace(Vector::Y) } else { SharedShape::ball(0.3) };
-                Obstacle { proxy: ProxyId(i as u32), key: i as u64, part: 0, shape, start, end }
+                Obstacle::new((ProxyId(i as u32), i as u64, 0), shape, [start, end])
             }).collect();
             let mut candidates = Candidates::default();
             candidates.update(&obstacles);

@@ -61,7 +61,7 @@ impl Detector {
             let s = triangle.map(|n| surface.index_of_node[n as usize] as usize);
             let corners = s.map(|s| self.local[s]);
             let reach = s.iter().fold(0.0, |a: f64, &s| a.max(self.reach[s])) + scene.motion;
-            let around = Aabb::from_points(corners.iter().map(to_real)).loosened(reach as f32);
+            let around = self.boxes[t].loosened(reach as f32);
             if !around.intersects(&scene.extent) || self.lies_under_one_face(&s) {
                 continue;
             }

@@ -26,6 +26,8 @@ pub(crate) struct Detector {
     motions: Vec<Vec3>,
     /// Per surface node, in the obstacle's frame.
     pub(super) local: Vec<Vec3>,
+    /// Box of each triangle, in that frame.
+    pub(super) boxes: Vec<Aabb>,
     pub(super) nodes: Vec<Option<SurfacePoint>>,
     /// Rim crossings found per edge.
     pub(super) edges: Vec<Option<SurfacePoint>>,
@@ -91,15 +93,20 @@ impl Detector {
         self.local.extend(surface.nodes.iter().map(to_local));
         let scene = PairScene::new(pair, obstacle, model, x);
         self.detect_nodes(&scene, memory, constraints);
-        let traits = obstacle.traits();
-        if !traits.is_plane {
+        let kind = obstacle.kind();
+        if !kind.is_plane {
+            let corner = |n: &u32| to_real(&self.local[surface.index_of_node[*n as usize] as usize]);
+            let boxes =
+                surface.triangles.iter().map(|triangle| Aabb::from_points(triangle.iter().map(corner)));
+            self.boxes.clear();
+            self.boxes.extend(boxes);
             self.detect_rims(&scene, constraints);
             self.detect_corners(&scene, constraints);
             self.keep_points(&scene, memory, constraints);
             self.detect_triangles(&scene, constraints);
             self.detect_segments(&scene, constraints);
         }
-        if traits.is_faceted {
+        if kind.is_faceted {
             one_constraint_per_feature(constraints, first);
         }
         constraints[first..].sort_unstable_by_key(|r| r.key);
@@ -195,11 +202,10 @@ impl Detector {
             let at = to_real(corner);
             let mut best: Option<(usize, [f64; 3], SurfacePoint)> = None;
             for (t, triangle) in surface.triangles.iter().enumerate() {
-                let corners = triangle.map(|n| self.local[surface.index_of_node[n as usize] as usize]);
-                let around = Aabb::from_points(corners.iter().map(to_real)).loosened(reach as f32);
-                if !around.contains_local_point(at) {
+                if !self.boxes[t].loosened(reach as f32).contains_local_point(at) {
                     continue;
                 }
+                let corners = triangle.map(|n| self.local[surface.index_of_node[n as usize] as usize]);
                 let turned = t >= surface.closed && self.looks_away(scene, triangle, &corners);
                 let [a, b, c] = corners;
                 let corners = if turned { [a, c, b] } else { corners };

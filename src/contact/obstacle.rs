@@ -1,6 +1,6 @@
 //! Rigid geometry as contact sees it.
 
-use super::shape_table::{ShapeTraits, Solidity, shape_traits};
+use super::shape_table::{ShapeKind, ShapeTraits, Solidity, shape_traits};
 use crate::math::{Pose64, Vec3};
 use parry3d::bounding_volume::Aabb;
 use parry3d::shape::SharedShape;
@@ -20,9 +20,20 @@ pub(crate) struct Obstacle {
     pub shape: SharedShape,
     pub start: Pose64,
     pub end: Pose64,
+    kind: ShapeKind,
 }
 
 impl Obstacle {
+    /// The `part` of a collider that `key` names, on its way from `start` to `end`.
+    pub fn new(
+        (proxy, key, part): (ProxyId, u64, u32),
+        shape: SharedShape,
+        [start, end]: [Pose64; 2],
+    ) -> Self {
+        let kind = shape_traits(&shape).kind;
+        Self { proxy, key, part, shape, start, end, kind }
+    }
+
     /// Displacement over the step \[m\] of the obstacle's material point that is at `p` at its start.
     pub fn displacement(&self, p: &Vec3) -> Vec3 {
         self.end.transform(&self.start.inverse_transform(p)) - p
@@ -53,11 +64,16 @@ impl Obstacle {
     }
 
     /// What contact has to know of its shape.
+    pub fn kind(&self) -> ShapeKind {
+        self.kind
+    }
+
+    /// Its corners, and the core that a thickness is around.
     pub fn traits(&self) -> ShapeTraits<'_> {
         shape_traits(&self.shape)
     }
 
     pub fn solidity(&self) -> Solidity {
-        self.traits().solidity
+        self.kind.solidity
     }
 }

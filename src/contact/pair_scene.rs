@@ -60,7 +60,7 @@ impl<'a> PairScene<'a> {
         let obstacle = self.obstacle;
         let soft = Endpoint::Soft { body: self.pair.body, nodes, weights };
         let proxy = Endpoint::Rigid { proxy: obstacle.proxy, point: obstacle.start.transform(&found.point) };
-        let slot = if obstacle.traits().is_faceted { 0 } else { slot };
+        let slot = if obstacle.kind().is_faceted { 0 } else { slot };
         let key = ObstacleContact { collider: obstacle.key, part: obstacle.part, feature, slot };
         let key = ConstraintKey::Obstacle(key);
         let normal = obstacle.start.rotation * found.normal;

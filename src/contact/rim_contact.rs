@@ -155,7 +155,7 @@ mod tests {
 
     fn obstacle(shape: SharedShape) -> Obstacle {
         let start = Pose64 { rotation: Mat3::identity(), translation: Vec3::zeros() };
-        Obstacle { proxy: ProxyId(0), key: 0, part: 0, shape, start, end: start }
+        Obstacle::new((ProxyId(0), 0, 0), shape, [start, start])
     }
 
     proptest! {

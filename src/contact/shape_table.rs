@@ -25,39 +25,49 @@ pub(crate) enum Corners<'a> {
     Mesh(&'a TriMesh),
 }
 
-/// One line of the table.
-#[derive(Clone, Copy)]
-pub(crate) struct ShapeTraits<'a> {
+/// What is asked of a shape for every point: kept with an obstacle, as the table is not free.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ShapeKind {
     pub solidity: Solidity,
     /// Made of plane faces: nodes, rims and corners carry what lies on it, one contact per feature of the body.
     pub is_faceted: bool,
     /// A plane without edges: its contacts with a body are all at nodes.
     pub is_plane: bool,
-    pub corners: Corners<'a>,
     /// Round shapes are a core and the thickness around it \[m\]: projections onto the core are exact where those onto
     /// the round shape iterate.
-    pub core: &'a dyn Shape,
     pub radius: f64,
+}
+
+/// One line of the table.
+#[derive(Clone, Copy)]
+pub(crate) struct ShapeTraits<'a> {
+    pub kind: ShapeKind,
+    pub corners: Corners<'a>,
+    /// Of a round shape; else the shape.
+    pub core: &'a dyn Shape,
 }
 
 /// The table.
 pub(crate) fn shape_traits(shape: &SharedShape) -> ShapeTraits<'_> {
     use Solidity::{Sheet, Solid};
     // Curved, sharp at the most along circles, which closest points find.
-    let curved = ShapeTraits {
-        solidity: Solid,
-        is_faceted: false,
-        is_plane: false,
-        corners: Corners::None,
-        core: &*shape.0,
-        radius: 0.0,
+    let curved = ShapeKind { solidity: Solid, is_faceted: false, is_plane: false, radius: 0.0 };
+    let plain = ShapeTraits { kind: curved, corners: Corners::None, core: &*shape.0 };
+    let round = |core, radius: f32| {
+        let kind = ShapeKind { radius: radius.into(), ..curved };
+        ShapeTraits { kind, core, ..plain }
     };
-    let round = |core, radius: f32| ShapeTraits { core, radius: radius.into(), ..curved };
-    let faceted = |corners| ShapeTraits { is_faceted: true, corners, ..curved };
-    let thin = |corners| ShapeTraits { solidity: Sheet, corners, ..curved };
+    let faceted = |solidity, corners| {
+        let kind = ShapeKind { solidity, is_faceted: true, ..curved };
+        ShapeTraits { kind, corners, ..plain }
+    };
+    let thin = |corners| {
+        let kind = ShapeKind { solidity: Sheet, ..curved };
+        ShapeTraits { kind, corners, ..plain }
+    };
     match shape.as_typed_shape() {
-        TypedShape::Ball(_) | TypedShape::Cylinder(_) | TypedShape::Cone(_) => curved,
-        TypedShape::HalfSpace(_) => ShapeTraits { is_plane: true, ..curved },
+        TypedShape::Ball(_) | TypedShape::Cylinder(_) | TypedShape::Cone(_) => plain,
+        TypedShape::HalfSpace(_) => ShapeTraits { kind: ShapeKind { is_plane: true, ..curved }, ..plain },
         TypedShape::Capsule(s) => round(&s.segment, s.radius),
         TypedShape::RoundCuboid(s) => round(&s.inner_shape, s.border_radius),
         // Its core has no inside; the thickness around it has.
@@ -65,18 +75,18 @@ pub(crate) fn shape_traits(shape: &SharedShape) -> ShapeTraits<'_> {
         TypedShape::RoundCylinder(s) => round(&s.inner_shape, s.border_radius),
         TypedShape::RoundCone(s) => round(&s.inner_shape, s.border_radius),
         TypedShape::RoundConvexPolyhedron(s) => round(&s.inner_shape, s.border_radius),
-        TypedShape::Cuboid(cuboid) => faceted(Corners::Box(cuboid.half_extents)),
-        TypedShape::ConvexPolyhedron(hull) => faceted(Corners::Points(hull.points())),
+        TypedShape::Cuboid(cuboid) => faceted(Solid, Corners::Box(cuboid.half_extents)),
+        TypedShape::ConvexPolyhedron(hull) => faceted(Solid, Corners::Points(hull.points())),
         TypedShape::TriMesh(mesh) => {
             let solidity = if mesh.pseudo_normals_if_oriented().is_some() { Solid } else { Sheet };
-            ShapeTraits { solidity, ..faceted(Corners::Mesh(mesh)) }
+            faceted(solidity, Corners::Mesh(mesh))
         }
         TypedShape::Triangle(triangle) => thin(Corners::Points(triangle.vertices())),
         TypedShape::Segment(segment) => thin(Corners::Ends([segment.a, segment.b])),
         TypedShape::Polyline(line) => thin(Corners::Points(line.vertices())),
         // Read as meshes, and compounds part by part; only a shape that could not be made one comes here.
         TypedShape::HeightField(_) => thin(Corners::None),
-        TypedShape::Voxels(_) => faceted(Corners::None),
-        TypedShape::Compound(_) | TypedShape::Custom(_) => curved,
+        TypedShape::Voxels(_) => faceted(Solid, Corners::None),
+        TypedShape::Compound(_) | TypedShape::Custom(_) => plain,
     }
 }

@@ -100,7 +100,7 @@ mod tests {
     fn cuboid(half: [f32; 3], at: Vec3, motion: Vec3) -> Obstacle {
         let pose = |translation| Pose64 { rotation: Mat3::identity(), translation };
         let shape = SharedShape::cuboid(half[0], half[1], half[2]);
-        Obstacle { proxy: ProxyId(0), key: 0, part: 0, shape, start: pose(at), end: pose(at + motion) }
+        Obstacle::new((ProxyId(0), 0, 0), shape, [pose(at), pose(at + motion)])
     }
 
     /// Seen from a box that stands a little in a floor or falls onto it.

@@ -7,7 +7,7 @@
 //! the gap is taken along the normal with the node's `f64` position.
 
 use super::obstacle::Obstacle;
-use super::shape_table::{ShapeTraits, Solidity};
+use super::shape_table::Solidity;
 use crate::math::{Vec3, from_real, to_real};
 use parry3d::shape::FeatureId;
 
@@ -123,7 +123,8 @@ struct Projection {
 }
 
 fn project(obstacle: &Obstacle, p: &Vec3) -> Option<Projection> {
-    let ShapeTraits { core, radius, .. } = obstacle.traits();
+    let radius = obstacle.kind().radius;
+    let core = if radius == 0.0 { &*obstacle.shape.0 } else { obstacle.traits().core };
     let (projection, feature) = core.project_local_point_and_get_feature(to_real(p));
     let point = from_real(projection.point);
     if !point.iter().all(|c| c.is_finite()) {
@@ -188,7 +189,7 @@ mod tests {
 
     fn obstacle(shape: SharedShape) -> Obstacle {
         let start = Pose64 { rotation: Mat3::identity(), translation: Vec3::zeros() };
-        Obstacle { proxy: ProxyId(0), key: 0, part: 0, shape, start, end: start }
+        Obstacle::new((ProxyId(0), 0, 0), shape, [start, start])
     }
 
     const SCALES: Scales = Scales { band: 4e-5, shift: 0.01 };

@@ -76,14 +76,8 @@ mod tests {
         #[test]
         fn nothing_ends_in_a_ball_or_behind_it(from in vector(3.0), to in vector(3.0), motion in vector(0.5)) {
             let pose = |translation| Pose64 { rotation: crate::math::Mat3::identity(), translation };
-            let obstacle = Obstacle {
-                proxy: ProxyId(0),
-                key: 0,
-                part: 0,
-                shape: SharedShape::ball(1.0),
-                start: pose(Vec3::zeros()),
-                end: pose(motion),
-            };
+            let ways = [pose(Vec3::zeros()), pose(motion)];
+            let obstacle = Obstacle::new((ProxyId(0), 0, 0), SharedShape::ball(1.0), ways);
             prop_assume!(from.norm() > 1.01);
             let (a, b) = (from, to - motion);
             // The nearest that the way comes to the centre, seen from the ball.
@@ -106,14 +100,9 @@ mod tests {
 
     #[test]
     fn what_was_inside_is_put_out_by_the_shortest_way() {
-        let obstacle = Obstacle {
-            proxy: ProxyId(0),
-            key: 0,
-            part: 0,
-            shape: SharedShape::new(parry3d::shape::Cuboid::new(Vector::new(1.0, 1.0, 1.0))),
-            start: Pose64::from_real(&parry3d::math::Pose::IDENTITY),
-            end: Pose64::from_real(&parry3d::math::Pose::IDENTITY),
-        };
+        let here = Pose64::from_real(&parry3d::math::Pose::IDENTITY);
+        let shape = SharedShape::new(parry3d::shape::Cuboid::new(Vector::new(1.0, 1.0, 1.0)));
+        let obstacle = Obstacle::new((ProxyId(0), 0, 0), shape, [here, here]);
         let stop = stop(&obstacle, &Vec3::new(0.2, 0.9, 0.0), &Vec3::new(0.3, 0.5, 0.0), 0.0).unwrap();
         assert!((stop.at - Vec3::new(0.3, 1.0, 0.0)).norm() < 1e-6, "{stop:?}");
         assert!((stop.normal - Vec3::y()).norm() < 1e-6);

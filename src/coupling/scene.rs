@@ -150,14 +150,11 @@ impl RapierScene {
     ) {
         let mut push = |shape: SharedShape, part: u32, start: Pose64, end: Pose64| {
             self.colliders.push(handle);
-            self.obstacles.push(Obstacle {
-                proxy,
-                key: packed(handle.into_raw_parts()),
-                part,
+            self.obstacles.push(Obstacle::new(
+                (proxy, packed(handle.into_raw_parts()), part),
                 shape,
-                start,
-                end,
-            });
+                [start, end],
+            ));
         };
         match shape.as_typed_shape() {
             TypedShape::Compound(compound) => {

@@ -132,7 +132,7 @@ mod tests {
     fn bodies_that_give_up_keep_their_shape_and_their_pins() {
         let pose = Pose64 { rotation: Mat3::identity(), translation: Vec3::new(0.0, -1.0, 0.0) };
         let shape = SharedShape::cuboid(1.0, 1.0, 1.0);
-        let floor = Obstacle { proxy: ProxyId(0), key: 0, part: 0, shape, start: pose, end: pose };
+        let floor = Obstacle::new((ProxyId(0), 0, 0), shape, [pose, pose]);
         for pinned in [false, true] {
             let mut bodies = DeformableBodySet::new();
             let builder = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2; 3])
