@@ -24,7 +24,7 @@ fn main() -> Result<(), DeformableBodyError> {
     let strap = deformables.insert(strap)?;
     let lower_end = deformables.bodies[strap].vertices_where(|x| x.y < 0.001);
     let to_box = AttachTo::RigidBody(load, *physics.bodies[load].position());
-    let tie = deformables.bodies.attach(strap, &lower_end, to_box)?;
+    let strap_end = deformables.bodies.attach(strap, &lower_end, to_box)?;
 
     // A block below the box, on a cable of 30 cm from the middle of its top: slack at first.
     let block = DeformableBodyBuilder::cuboid(Vector::splat(0.05), [2, 2, 2])
@@ -43,9 +43,9 @@ fn main() -> Result<(), DeformableBodyError> {
     for step in 1..=600 {
         deformables.step(&mut physics);
         if [6, 60, 600].contains(&step) {
-            let [tie, cable] = [-force(&deformables, tie), force(&deformables, cable)];
+            let [strap_end, cable] = [-force(&deformables, strap_end), force(&deformables, cable)];
             println!(
-                "{:>4.1} s: the strap is pulled down by {tie:.3} N, the block up by {cable:.3} N",
+                "{:>4.1} s: the strap is pulled down by {strap_end:.3} N, the block up by {cable:.3} N",
                 step as f32 / 60.0
             );
         }
@@ -59,7 +59,7 @@ fn main() -> Result<(), DeformableBodyError> {
     let expected = (weight + own) * 0.5 / (5.0e6 * 0.04 * 0.01);
     let stretch = -0.1 - f64::from(physics.bodies[load].translation().y);
     println!("the strap has stretched by {:.2} mm; as a bar by {:.2} mm", stretch * 1e3, expected * 1e3);
-    assert!((f64::from(force(&deformables, tie)) / -weight - 1.0).abs() < 1.0e-2);
+    assert!((f64::from(force(&deformables, strap_end)) / -weight - 1.0).abs() < 1.0e-2);
     assert!((f64::from(force(&deformables, cable)) / block_weight - 1.0).abs() < 1.0e-2);
     Ok(())
 }

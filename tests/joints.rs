@@ -230,7 +230,7 @@ fn hinge_of(physics: &PhysicsWorld, bar: RigidBodyHandle) -> [f64; 2] {
 }
 
 /// Ties the cube to the bar where it is.
-fn tie(
+fn attach(
     world: &mut DeformableWorld,
     physics: &PhysicsWorld,
     builder: DeformableBodyBuilder,
@@ -276,9 +276,9 @@ fn attached_bar(angle: f32, gravity: Vector, hinge: RevoluteJointBuilder, soft: 
     let (bar, joint) = hinged_bar(&mut physics, angle, hinge);
     let mut world = DeformableWorld::new();
     if soft {
-        // A centimetre above the bar: no contact shares the load with the ties.
+        // A centimetre above the bar: no contact shares the load with the attachment.
         let at = physics.bodies[bar].position().transform_point(Vector::new(0.3, 0.16, 0.0));
-        tie(&mut world, &physics, small_cube(at).rotation(Vector::Z * angle), bar);
+        attach(&mut world, &physics, small_cube(at).rotation(Vector::Z * angle), bar);
     }
     Attached { physics, world, bar, joint: SolvedJoint::Impulse(joint) }
 }

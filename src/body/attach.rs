@@ -21,14 +21,14 @@ impl DeformableBodySet {
     /// // The upper face, where it is on the hook now.
     /// let top = deformables.bodies[block].vertices_where(|x| x.y > 0.099);
     /// let pose = *physics.bodies[hook].position();
-    /// let tie = deformables.bodies.attach(block, &top, AttachTo::RigidBody(hook, pose))?;
+    /// let glue = deformables.bodies.attach(block, &top, AttachTo::RigidBody(hook, pose))?;
     /// for _ in 0..120 {
     ///     deformables.step(&mut physics);
     /// }
-    /// let held = deformables.bodies.attachment(tie).map(|tie| tie.force().y);
+    /// let held = deformables.bodies.attachment(glue).map(|glue| glue.force().y);
     /// assert!((held.unwrap_or(0.0) - 8.0 * 9.81).abs() < 0.1);
-    /// // Its user may let go, or have it break by itself: `attachment_mut(tie)` and `set_break_force`.
-    /// assert!(deformables.bodies.detach(tie).is_some());
+    /// // Its user may let go, or have it break by itself: `attachment_mut(glue)` and `set_break_force`.
+    /// assert!(deformables.bodies.detach(glue).is_some());
     /// # Ok::<(), DeformableBodyError>(())
     /// ```
     ///

@@ -47,6 +47,20 @@ pub(crate) fn solve_semidefinite(S: &Mat3, b: &Vec3) -> Vec3 {
     out
 }
 
+/// Mass and centre of mass of points.
+pub(crate) fn centre_of_mass(x: &[Vec3], masses: &[f64]) -> (f64, Vec3) {
+    let total: f64 = masses.iter().sum();
+    (total, x.iter().zip(masses).map(|(x, m)| x * *m).sum::<Vec3>() / total)
+}
+
+/// Inertia of points about a centre [kg m²].
+pub(crate) fn inertia_about(centre: &Vec3, x: &[Vec3], masses: &[f64]) -> Mat3 {
+    x.iter().zip(masses).fold(Mat3::zeros(), |sum, (x, m)| {
+        let arm = x - centre;
+        sum + (Mat3::identity() * arm.norm_squared() - arm * arm.transpose()) * *m
+    })
+}
+
 /// `Σ a_i·b_i` over nodes.
 pub(crate) fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()

@@ -1,7 +1,7 @@
 //! What is put right at the end of a body's step, and read off it.
 
 use super::problem::BodyProblem;
-use crate::math::{Mat3, Vec3, rotation_from_vector, solve_semidefinite};
+use crate::math::{Vec3, centre_of_mass, inertia_about, rotation_from_vector, solve_semidefinite};
 
 /// Largest turn \[rad\] that [`BodyProblem::balance`] takes for the rest of an iteration.
 const MAX_BALANCING_TURN: f64 = 0.1;
@@ -14,16 +14,14 @@ impl BodyProblem {
     /// moment: what is left of it after a few iterations would set the body spinning. Deforms nothing.
     pub fn balance(&mut self) {
         let mobility = self.mobility();
-        let total: f64 = self.masses.iter().sum();
         let x = &mut self.current.x;
-        let centre = x.iter().zip(&self.masses).map(|(x, m)| x * *m).sum::<Vec3>() / total;
-        let (mut force, mut moment, mut inertia) = (Vec3::zeros(), Vec3::zeros(), Mat3::zeros());
-        for ((x, r), m) in x.iter().zip(&self.current.r).zip(&self.masses) {
-            let arm = x - centre;
+        let (total, centre) = centre_of_mass(x, &self.masses);
+        let (mut force, mut moment) = (Vec3::zeros(), Vec3::zeros());
+        for (x, r) in x.iter().zip(&self.current.r) {
             force += r;
-            moment += arm.cross(r);
-            inertia += (Mat3::identity() * arm.norm_squared() - arm * arm.transpose()) * *m;
+            moment += (x - centre).cross(r);
         }
+        let inertia = inertia_about(&centre, x, &self.masses);
         let turn = solve_semidefinite(&inertia, &moment) * mobility;
         let turn = if turn.norm() < MAX_BALANCING_TURN { turn } else { Vec3::zeros() };
         let (rotation, shift) = (rotation_from_vector(&turn), force * (mobility / total));
@@ -39,21 +37,18 @@ impl BodyProblem {
         if !(in_flight && self.settings.keeps_spin && self.key.pins.is_empty()) {
             return;
         }
-        let total: f64 = self.masses.iter().sum();
-        let mean = |p: &[Vec3]| p.iter().zip(&self.masses).map(|(p, m)| p * *m).sum::<Vec3>() / total;
-        let centre = mean(&self.current.x);
+        let (_, centre) = centre_of_mass(&self.current.x, &self.masses);
         let inertial = |i: usize| self.target[i] - self.x_start[i] - self.v_start[i] * self.h;
         let (mut gained, mut lost) = (Vec3::zeros(), Vec3::zeros());
-        let mut inertia = Mat3::zeros();
         for (i, m) in self.masses.iter().enumerate() {
             let arm = self.current.x[i] - centre;
             // External forces act where the nodes are at the end of the step, as in the step itself.
             gained += arm.cross(&inertial(i)) * (*m / (self.h * self.h) * self.dt);
             lost += arm.cross(&v[i]) * *m;
-            inertia += (Mat3::identity() * arm.norm_squared() - arm * arm.transpose()) * *m;
         }
         let drag = 1.0 + self.material.mass_damping * self.dt;
         let missing = (self.spin + gained) / drag - lost;
+        let inertia = inertia_about(&centre, &self.current.x, &self.masses);
         let turn = solve_semidefinite(&inertia, &missing);
         if turn.norm() * self.h < MAX_SPIN_GIVEN {
             for (v, x) in v.iter_mut().zip(&self.current.x) {

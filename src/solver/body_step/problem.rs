@@ -8,7 +8,9 @@ use crate::body::{DeformableBody, Integrator, PrescribedNode, SolverSettings};
 use crate::fem::elastic_forces::{Evaluation, StiffnessDamping};
 use crate::fem::{DeformableModel, Elements, elastic_forces};
 use crate::material::DeformableMaterial;
-use crate::math::{Mat3, Vec3, rotation_from_vector, skew, solve_semidefinite};
+use crate::math::{
+    Mat3, Vec3, centre_of_mass, inertia_about, rotation_from_vector, skew, solve_semidefinite,
+};
 use crate::profiler::timed;
 use crate::solver::counters::SolveCounters;
 use crate::solver::linear::{FactorId, FactorKey, Preconditioner, SystemFactor};
@@ -251,15 +253,14 @@ impl BodyProblem {
         if self.preconditioner.is_per_node() || !self.key.pins.is_empty() {
             return false;
         }
-        let total: f64 = self.masses.iter().sum();
-        let mean = |p: &[Vec3]| p.iter().zip(&self.masses).map(|(p, m)| p * *m).sum::<Vec3>() / total;
-        let (centre, moved_to) = (mean(&self.current.x), mean(&self.trial.x));
-        let (mut moment, mut inertia) = (Vec3::zeros(), Mat3::zeros());
+        let (_, centre) = centre_of_mass(&self.current.x, &self.masses);
+        let (_, moved_to) = centre_of_mass(&self.trial.x, &self.masses);
+        let mut moment = Vec3::zeros();
         for ((x, y), m) in self.current.x.iter().zip(&self.trial.x).zip(&self.masses) {
             let r = x - centre;
             moment += r.cross(&(y - moved_to - r)) * *m;
-            inertia += (Mat3::identity() * r.norm_squared() - r * r.transpose()) * *m;
         }
+        let inertia = inertia_about(&centre, &self.current.x, &self.masses);
         let omega = solve_semidefinite(&inertia, &moment);
         // Below this the stretch is 5e-9.
         if !(omega.norm() > FRAME_ERROR) {

@@ -1,6 +1,6 @@
 //! The motion of a body that keeps its shape.
 
-use crate::math::{Mat3, Vec3, skew, solve_semidefinite};
+use crate::math::{Mat3, Vec3, centre_of_mass, inertia_about, skew, solve_semidefinite};
 
 /// How a body moves that keeps its shape: displacements about its centre of mass.
 #[derive(Default)]
@@ -14,13 +14,10 @@ pub(crate) struct RigidMode {
 impl RigidMode {
     /// Of masses at `x`, with a mobility of `h²/(1 + αh)` [s²].
     pub fn set(&mut self, x: &[Vec3], masses: &[f64], mobility: f64) {
-        let total: f64 = masses.iter().sum();
-        let centre = x.iter().zip(masses).map(|(x, m)| x * *m).sum::<Vec3>() / total;
+        let (total, centre) = centre_of_mass(x, masses);
         self.arms.clear();
         self.arms.extend(x.iter().map(|x| x - centre));
-        let inertia = self.arms.iter().zip(masses).fold(Mat3::zeros(), |sum, (arm, m)| {
-            sum + (Mat3::identity() * arm.norm_squared() - arm * arm.transpose()) * *m
-        });
+        let inertia = inertia_about(&centre, x, masses);
         self.by_force = mobility / total;
         for c in 0..3 {
             self.by_moment.set_column(c, &(solve_semidefinite(&inertia, &Vec3::ith(c, 1.0)) * mobility));
