@@ -4,6 +4,7 @@ use super::shape_table::{ShapeKind, ShapeTraits, Solidity, shape_traits};
 use crate::math::{Pose64, Vec3};
 use parry3d::bounding_volume::Aabb;
 use parry3d::shape::SharedShape;
+use std::sync::Arc;
 
 /// Names a rigid body (or a collider without one) within a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -21,6 +22,8 @@ pub(crate) struct Obstacle {
     pub start: Pose64,
     pub end: Pose64,
     kind: ShapeKind,
+    /// Of a mesh, the vertices that are corners, ascending; all of them if nobody has said.
+    corners: Option<Arc<[u32]>>,
 }
 
 impl Obstacle {
@@ -31,7 +34,18 @@ impl Obstacle {
         [start, end]: [Pose64; 2],
     ) -> Self {
         let kind = shape_traits(&shape).kind;
-        Self { proxy, key, part, shape, start, end, kind }
+        Self { proxy, key, part, shape, start, end, kind, corners: None }
+    }
+
+    /// The same, with the vertices of its mesh that are corners, ascending.
+    pub fn with_corners(mut self, corners: Option<Arc<[u32]>>) -> Self {
+        self.corners = corners;
+        self
+    }
+
+    /// Whether a vertex of its mesh is a corner.
+    pub fn is_corner(&self, vertex: u32) -> bool {
+        self.corners.as_ref().is_none_or(|corners| corners.binary_search(&vertex).is_ok())
     }
 
     /// Displacement over the step \[m\] of the obstacle's material point that is at `p` at its start.

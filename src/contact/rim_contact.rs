@@ -105,7 +105,8 @@ pub(crate) fn corners_in(obstacle: &Obstacle, region: &Aabb, found: &mut Vec<(u3
         Corners::Ends(ends) => ends.iter().zip(0..).for_each(|(&end, number)| take(number, end)),
         Corners::Mesh(mesh) => {
             for triangle in mesh.bvh().intersect_aabb(region) {
-                for number in mesh.indices()[triangle as usize] {
+                let corners = mesh.indices()[triangle as usize];
+                for number in corners.into_iter().filter(|n| obstacle.is_corner(*n)) {
                     take(number, mesh.vertices()[number as usize]);
                 }
             }

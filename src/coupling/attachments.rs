@@ -50,14 +50,17 @@ pub(crate) fn prescribed_nodes(
     }
 }
 
-/// Lists the nodes that hard attachments hold to rigid bodies, each with its body and the rigid body's proxy.
+/// Lists the nodes that attachments hold to rigid bodies, each with its body and the rigid body's proxy: hard ones and
+/// those that give way, but no cables.
 pub(crate) fn attached_nodes(
     deformables: &DeformableBodySet,
     scene: &mut RapierScene,
     context: &StepContext<'_>,
     attached: &mut Vec<(DeformableBodyHandle, ProxyId, u32)>,
 ) {
-    for (_, attachment) in deformables.attachments().filter(|(_, a)| a.is_hard()) {
+    let keeps =
+        |a: &DeformableAttachment| !a.is_broken() && a.length() == 0.0 && a.compliance() < f64::INFINITY;
+    for (_, attachment) in deformables.attachments().filter(|(_, a)| keeps(a)) {
         let Anchors::Rigid(rigid, _) = &attachment.anchors else { continue };
         let Some(proxy) = scene.body_proxy(context, *rigid) else { continue };
         attached.extend(attachment.nodes.iter().map(|node| (attachment.body(), proxy, *node)));

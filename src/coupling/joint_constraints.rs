@@ -10,9 +10,9 @@ use crate::contact::{Constraint, Endpoint, Law, ProxyId};
 use crate::math::{Mat3, Pose64, Vec3, rotation_vector};
 use crate::solver::RigidProxies;
 use rapier3d::dynamics::{
-    GenericJoint, ImpulseJointHandle, JointAxesMask, JointLimits, JointMotor, MotorModel, RigidBodyHandle,
+    GenericJoint, ImpulseJointHandle, JointAxesMask, JointMotor, MotorModel, RigidBodyHandle,
 };
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// What names a joint in the keys of its constraints.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +38,8 @@ impl JointName {
 /// What a joint connects.
 pub(super) struct JointEnds {
     pub name: JointName,
+    /// Of a multibody joint: its own coordinates, of which angles count turns.
+    pub coordinates: Option<[f64; 6]>,
     pub proxies: [ProxyId; 2],
     /// Poses of the two bodies.
     pub poses: [Pose64; 2],
@@ -50,6 +52,8 @@ struct Coordinate {
     /// \[m\] or \[rad\].
     value: f64,
     name: JointName,
+    /// An angle that is read off a relative rotation, and so does not count turns.
+    is_wrapped: bool,
     /// As [`JointAxis::axis`].
     number: u32,
 }
@@ -75,7 +79,9 @@ pub(super) fn joint_constraints(
         let coordinate = distance(coupled, ends, &frame1, &frame2);
         let first = coupled.bits().trailing_zeros() as usize;
         // Rapier's coupled axes have no lower limit: a rope lets what it holds pass its anchor.
-        coordinate.limit_above(&joint.limits[first], has_limit(joint, first), constraints);
+        let mut above = *joint;
+        above.limits[first].min = -f32::MAX;
+        limit_constraints(&above, first, &coordinate, constraints);
         motor_constraint(joint, first, &coordinate, proxies, dt, constraints);
     }
     for axis in 0..6 {
@@ -114,16 +120,6 @@ pub(super) fn drive_constraints(
     joint_constraints(&free, ends, proxies, dt, constraints);
 }
 
-fn has_limit(joint: &GenericJoint, axis: usize) -> bool {
-    joint.limit_axes.intersects(JointAxesMask::from_bits_truncate(1 << axis))
-}
-
-/// Between two limits; zero where one is missing.
-fn middle(limits: &JointLimits<f32>) -> f64 {
-    let is_range = limits.min > -UNLIMITED && limits.max < UNLIMITED;
-    if is_range { 0.5 * (f64::from(limits.min) + f64::from(limits.max)) } else { 0.0 }
-}
-
 fn limit_constraints(
     joint: &GenericJoint,
     axis: usize,
@@ -131,12 +127,21 @@ fn limit_constraints(
     constraints: &mut Vec<Constraint>,
 ) {
     let limits = &joint.limits[axis];
-    if has_limit(joint, axis) && limits.min > -UNLIMITED {
-        // As rapier measures angles: from the middle between the limits.
-        let value = coordinate.value_near(middle(limits));
+    let half_range = 0.5 * (f64::from(limits.max) - f64::from(limits.min));
+    // As rapier: of an angle that does not count turns, a range of a full turn or more is no limit.
+    let is_limited = !coordinate.is_wrapped || half_range < PI;
+    if !(is_limited && joint.limit_axes.intersects(JointAxesMask::from_bits_truncate(1 << axis))) {
+        return;
+    }
+    // And such an angle is measured from the middle between the limits.
+    let value = coordinate.value_near(0.5 * (f64::from(limits.min) + f64::from(limits.max)));
+    if limits.min > -UNLIMITED {
         constraints.push(coordinate.constraint(value - f64::from(limits.min), JointRole::LowerLimit));
     }
-    coordinate.limit_above(limits, has_limit(joint, axis), constraints);
+    if limits.max < UNLIMITED {
+        let reversed = Coordinate { axis: -coordinate.axis, ..*coordinate };
+        constraints.push(reversed.constraint(f64::from(limits.max) - value, JointRole::UpperLimit));
+    }
 }
 
 /// A motor's force `−k(q − q*) − d(q̇ − q̇*)` at the end of the step is a constraint that gives way by
@@ -180,6 +185,7 @@ fn linear(axis: usize, ends: &JointEnds, frame1: &Pose64, frame2: &Pose64) -> Co
         axis: direction,
         value,
         name: ends.name,
+        is_wrapped: false,
         number: axis as u32,
     }
 }
@@ -200,6 +206,7 @@ fn distance(axes: JointAxesMask, ends: &JointEnds, frame1: &Pose64, frame2: &Pos
         axis: frame1.rotation * local,
         value,
         name: ends.name,
+        is_wrapped: false,
         number: 6,
     }
 }
@@ -230,7 +237,11 @@ fn angular(
     };
     let endpoints =
         [Endpoint::Rotation { proxy: ends.proxies[1] }, Endpoint::Rotation { proxy: ends.proxies[0] }];
-    Coordinate { endpoints, axis: direction, value, name: ends.name, number: axis as u32 }
+    let (value, is_wrapped) = match ends.coordinates {
+        Some(own) => (own[axis], false),
+        None => (value, true),
+    };
+    Coordinate { endpoints, axis: direction, value, name: ends.name, is_wrapped, number: axis as u32 }
 }
 
 fn at_point(ends: &JointEnds, point: Vec3) -> [Endpoint; 2] {
@@ -243,25 +254,9 @@ impl Coordinate {
         Constraint::new(self.endpoints, self.axis, gap, self.name.key(self.number, role))
     }
 
-    /// The value; of an angle the turn that is nearest to another one.
+    /// The value; of an angle that does not count turns that turn which is nearest to another angle.
     fn value_near(&self, other: f64) -> f64 {
-        let is_angle = matches!(self.endpoints[0], Endpoint::Rotation { .. });
-        if !is_angle || !other.is_finite() {
-            return self.value;
-        }
-        self.value - TAU * ((self.value - other) / TAU).round()
-    }
-
-    fn limit_above(&self, limits: &JointLimits<f32>, is_limited: bool, constraints: &mut Vec<Constraint>) {
-        if is_limited && limits.max < UNLIMITED {
-            let value = self.value_near(middle(limits));
-            let gap = f64::from(limits.max) - value;
-            constraints.push(self.reversed().constraint(gap, JointRole::UpperLimit));
-        }
-    }
-
-    fn reversed(&self) -> Self {
-        Self { axis: -self.axis, ..*self }
+        if self.is_wrapped { self.value - TAU * ((self.value - other) / TAU).round() } else { self.value }
     }
 
     /// Acceleration per force [1/kg], or the like about an axis.

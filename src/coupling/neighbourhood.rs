@@ -12,7 +12,9 @@ use super::scene::RapierScene;
 use crate::contact::{Candidates, Constraint, ProxyId, SpeculativePoint};
 use crate::math::Pose64;
 use crate::solver::RigidProxy;
-use rapier3d::dynamics::{ImpulseJointHandle, MultibodyIndex, RigidBodyHandle};
+use rapier3d::dynamics::{
+    ImpulseJointHandle, JointAxesMask, MultibodyIndex, MultibodyJoint, RigidBodyHandle,
+};
 use rapier3d::geometry::ColliderHandle;
 use std::collections::HashSet;
 
@@ -133,7 +135,8 @@ impl RigidNeighbourhood {
         for link in multibody.links() {
             let Some(parent) = link.parent_id().and_then(|id| multibody.link(id)) else { continue };
             let handles = [parent.rigid_body_handle(), link.rigid_body_handle()];
-            let Some(ends) = around.ends(JointName::Multibody(handles[1]), handles) else { continue };
+            let Some(mut ends) = around.ends(JointName::Multibody(handles[1]), handles) else { continue };
+            ends.coordinates = own_coordinates(&link.joint);
             let (proxies, h) = (&around.scene.proxies, around.context.h);
             drive_constraints(&link.joint.data, &ends, proxies, h, &mut self.constraints);
             if !link.joint.data.motor_axes.is_empty() {
@@ -157,6 +160,12 @@ impl WalkContext<'_> {
         let [first, second] = bodies.map(|b| self.body_proxy(b));
         let [pose1, pose2] =
             bodies.map(|b| Some(Pose64::from_real(self.context.sets.bodies.get(b)?.position())));
-        Some(JointEnds { name, proxies: [first?, second?], poses: [pose1?, pose2?] })
+        Some(JointEnds { name, coordinates: None, proxies: [first?, second?], poses: [pose1?, pose2?] })
     }
+}
+
+/// Coordinates of a multibody joint that turns about one axis at the most; others' angles are no coordinates.
+fn own_coordinates(joint: &MultibodyJoint) -> Option<[f64; 6]> {
+    let free = (JointAxesMask::ANG_AXES & !joint.data.locked_axes).bits().count_ones();
+    (free <= 1).then(|| joint.coords().map(f64::from))
 }

@@ -148,13 +148,12 @@ impl RapierScene {
         start: Pose64,
         end: Pose64,
     ) {
+        let (shape, corners) = self.meshes.mesh_of(shape);
         let mut push = |shape: SharedShape, part: u32, start: Pose64, end: Pose64| {
             self.colliders.push(handle);
-            self.obstacles.push(Obstacle::new(
-                (proxy, packed(handle.into_raw_parts()), part),
-                shape,
-                [start, end],
-            ));
+            let names = (proxy, packed(handle.into_raw_parts()), part);
+            let obstacle = Obstacle::new(names, shape, [start, end]).with_corners(corners.clone());
+            self.obstacles.push(obstacle);
         };
         match shape.as_typed_shape() {
             TypedShape::Compound(compound) => {
@@ -163,7 +162,7 @@ impl RapierScene {
                     push(shape.clone(), part as u32, start.compose(&offset), end.compose(&offset));
                 }
             }
-            _ => push(self.meshes.mesh_of(shape), 0, start, end),
+            _ => push(shape, 0, start, end),
         }
     }
 }

@@ -1,15 +1,25 @@
-//! Heightfields and voxels as triangle meshes: meshes project points faster, and tell faces, rims and corners.
+//! Heightfields and voxels as triangle meshes, which project points faster and tell faces, rims and corners; and which
+//! vertices of a mesh are corners.
 
-use parry3d::shape::{SharedShape, TriMeshFlags, TypedShape};
-use std::collections::HashMap;
+use parry3d::bounding_volume::Aabb;
+use parry3d::math::{IVector, Vector};
+use parry3d::shape::{SharedShape, TriMeshFlags, TypedShape, Voxels};
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// The meshes of a world's shapes, made when they are first seen and kept while they are.
 #[derive(Default)]
 pub(super) struct ShapeMeshes {
-    /// By address. The shape is kept too, so that its address stays its own.
-    meshes: HashMap<usize, (SharedShape, SharedShape)>,
-    seen: Vec<usize>,
+    /// By address.
+    meshes: HashMap<usize, Kept>,
+    seen: HashSet<usize>,
+}
+
+struct Kept {
+    /// Kept so that its address stays its own.
+    _shape: SharedShape,
+    mesh: SharedShape,
+    corners: Arc<[u32]>,
 }
 
 impl ShapeMeshes {
@@ -24,18 +34,20 @@ impl ShapeMeshes {
         self.meshes.retain(|address, _| seen.contains(address));
     }
 
-    /// The mesh of a shape that is better read as one; else the shape.
-    pub fn mesh_of(&mut self, shape: SharedShape) -> SharedShape {
-        if !matches!(shape.as_typed_shape(), TypedShape::HeightField(_) | TypedShape::Voxels(_)) {
-            return shape;
+    /// The shape, or the mesh that it is better read as; of a mesh the vertices that are corners, ascending.
+    pub fn mesh_of(&mut self, shape: SharedShape) -> (SharedShape, Option<Arc<[u32]>>) {
+        use TypedShape::{HeightField, TriMesh, Voxels};
+        if !matches!(shape.as_typed_shape(), HeightField(_) | Voxels(_) | TriMesh(_)) {
+            return (shape, None);
         }
         let address = Arc::as_ptr(&shape.0).cast::<()>() as usize;
-        self.seen.push(address);
-        let (_, mesh) = self.meshes.entry(address).or_insert_with(|| {
+        self.seen.insert(address);
+        let kept = self.meshes.entry(address).or_insert_with(|| {
             let mesh = made(&shape).unwrap_or_else(|| shape.clone());
-            (shape, mesh)
+            let corners = corners_of(&mesh).into();
+            Kept { _shape: shape, mesh, corners }
         });
-        mesh.clone()
+        (kept.mesh.clone(), Some(kept.corners.clone()))
     }
 }
 
@@ -47,10 +59,122 @@ fn made(shape: &SharedShape) -> Option<SharedShape> {
         }
         // Their free faces bound a solid.
         TypedShape::Voxels(voxels) => {
-            let (vertices, triangles) = voxels.to_trimesh();
-            let flags = TriMeshFlags::ORIENTED | TriMeshFlags::MERGE_DUPLICATE_VERTICES;
-            SharedShape::trimesh_with_flags(vertices, triangles, flags).ok()
+            let (vertices, triangles) = free_faces(voxels);
+            SharedShape::trimesh_with_flags(vertices, triangles, TriMeshFlags::ORIENTED).ok()
         }
         _ => None,
+    }
+}
+
+/// The free faces of voxels, two triangles each. Vertices are those of the grid, so that neighbours share them: parry's
+/// own mesh computes each from its voxel's centre, where roundings keep equal ones apart.
+fn free_faces(voxels: &Voxels) -> (Vec<Vector>, Vec<[u32; 3]>) {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    let mut known: HashMap<[i32; 3], u32> = HashMap::new();
+    let corners = Aabb::new(Vector::ZERO, Vector::ONE).vertices();
+    for voxel in voxels.voxels() {
+        let faces = voxel.state.free_faces();
+        for (k, &(a, b, c, d)) in Aabb::FACES_VERTEX_IDS.iter().enumerate() {
+            if faces.bits() & (1 << k) == 0 {
+                continue;
+            }
+            let [a, b, c, d] = [a, b, c, d].map(|corner| {
+                let at = voxel.grid_coords + corners[corner].as_ivec3();
+                *known.entry(at.to_array()).or_insert_with(|| {
+                    vertices.push(grid_point(voxels, at));
+                    vertices.len() as u32 - 1
+                })
+            });
+            // Outward: parry lists every other face the other way round.
+            let own = if k % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] };
+            triangles.extend(own);
+        }
+    }
+    (vertices, triangles)
+}
+
+/// The lower corner of the voxel at these coordinates \[m\].
+fn grid_point(voxels: &Voxels, at: IVector) -> Vector {
+    voxels.voxel_center(at) - voxels.voxel_size() * 0.5
+}
+
+/// Sine below which triangles count as coplanar: of meshes in single precision.
+const COPLANAR: f32 = 1.0e-3;
+
+/// Vertices of a mesh that can press a point into a face: all but those within a plane face or along a straight edge of
+/// a surface that goes on around them. Ascending.
+fn corners_of(mesh: &SharedShape) -> Vec<u32> {
+    let Some(mesh) = mesh.as_trimesh() else { return Vec::new() };
+    let mut normals: Vec<Vec<Vector>> = vec![Vec::new(); mesh.vertices().len()];
+    let mut uses: HashMap<[u32; 2], u32> = HashMap::new();
+    for triangle in mesh.indices() {
+        let [a, b, c] = triangle.map(|n| mesh.vertices()[n as usize]);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        for k in 0..3 {
+            let (i, j) = (triangle[k], triangle[(k + 1) % 3]);
+            normals[i as usize].push(normal);
+            *uses.entry([i.min(j), i.max(j)]).or_default() += 1;
+        }
+    }
+    let open = uses.iter().filter(|(_, count)| **count == 1).flat_map(|(edge, _)| *edge);
+    let open: HashSet<u32> = open.collect();
+    let is_corner = |n: &u32| {
+        let own = &normals[*n as usize];
+        !own.is_empty() && (open.contains(n) || spans_space(own))
+    };
+    (0..normals.len() as u32).filter(is_corner).collect()
+}
+
+/// Whether unit normals are neither all along one line nor all across one.
+fn spans_space(normals: &[Vector]) -> bool {
+    let first = normals[0];
+    let across = normals.iter().map(|n| first.cross(*n)).max_by(|a, b| a.length().total_cmp(&b.length()));
+    let Some(across) = across.filter(|a| a.length() > COPLANAR) else { return false };
+    let along = across.normalize_or_zero();
+    normals.iter().any(|n| n.dot(along).abs() > COPLANAR)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn corners(shape: SharedShape) -> Vec<Vector> {
+        let (mesh, corners) = ShapeMeshes::default().mesh_of(shape);
+        let mesh = mesh.as_trimesh().unwrap();
+        corners.unwrap().iter().map(|&n| mesh.vertices()[n as usize]).collect()
+    }
+
+    #[test]
+    fn corners_of_a_floor_of_voxels_are_those_of_its_box() {
+        // 0.1 is no power of two: computed from the centres, vertices of neighbours differ.
+        let cells: Vec<IVector> = (0..6)
+            .flat_map(|x| (0..2).flat_map(move |y| (0..5).map(move |z| IVector::new(x, y, z))))
+            .collect();
+        let found = corners(SharedShape::voxels(Vector::splat(0.1), &cells));
+        assert_eq!(found.len(), 8, "{found:?}");
+        let size = Vector::new(0.6, 0.2, 0.5);
+        for corner in found {
+            // 3 ulp of 0.6.
+            assert!((corner.min(size - corner)).abs().max_element() < 2e-7, "{corner}");
+        }
+    }
+
+    #[test]
+    fn a_step_of_voxels_has_twelve_corners() {
+        let cells = [IVector::ZERO, IVector::new(1, 0, 0), IVector::new(0, 1, 0)];
+        // Six above and below each of the two sides of an L: the inner one is a corner too.
+        assert_eq!(corners(SharedShape::voxels(Vector::splat(0.3), &cells)).len(), 12);
+    }
+
+    #[test]
+    fn vertices_within_a_flat_floor_are_no_corners_and_those_at_its_border_are() {
+        let at = |x: u32, z: u32| 4 * z + x;
+        let vertices = (0..16).map(|k| Vector::new((k % 4) as f32, 0.0, (k / 4) as f32)).collect();
+        let cells = (0..3).flat_map(|x| (0..3).map(move |z| (x, z)));
+        let triangles = cells.flat_map(|(x, z)| {
+            [[at(x, z), at(x, z + 1), at(x + 1, z)], [at(x + 1, z), at(x, z + 1), at(x + 1, z + 1)]]
+        });
+        let found = corners(SharedShape::trimesh(vertices, triangles.collect()).unwrap());
+        assert_eq!(found.len(), 12);
     }
 }

@@ -166,7 +166,7 @@ fn yielding(poses: &[Pose64; 2]) -> RigidProxies {
 
 fn constraints_of(joint: &GenericJoint, poses: [Pose64; 2], proxies: &RigidProxies) -> Vec<Constraint> {
     let name = JointName::Multibody(RigidBodyHandle::from_raw_parts(7, 0));
-    let ends = JointEnds { name, proxies: [ProxyId(0), ProxyId(1)], poses };
+    let ends = JointEnds { name, coordinates: None, proxies: [ProxyId(0), ProxyId(1)], poses };
     let mut constraints = Vec::new();
     joint_constraints(joint, &ends, proxies, H, &mut constraints);
     constraints

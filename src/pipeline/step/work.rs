@@ -32,7 +32,7 @@ pub(super) struct BodyWork {
     distances: Vec<(f32, u32)>,
     /// Nodes that attachments and contacts with other deformables act on.
     pub linked_nodes: Vec<u32>,
-    /// Nodes that hard attachments hold to a rigid body, by that body's proxy, ascending: they do not collide with it.
+    /// Nodes that attachments hold to a rigid body, by that body's proxy, ascending: they do not collide with it.
     pub attached: Vec<(ProxyId, u32)>,
     /// Nodes that attachments prescribe.
     pub prescribed: Vec<PrescribedNode>,
@@ -201,7 +201,11 @@ impl BodyWork {
     /// nodes by their distance from those.
     pub fn look_ahead(&mut self, body: &DeformableBody, scene: &RapierScene, candidates: &Candidates) {
         self.ahead.clear();
-        let Some(problem) = self.problem.as_ref().filter(|_| self.constraints.is_empty()) else { return };
+        let Some(problem) =
+            self.problem.as_ref().filter(|_| self.constraints.is_empty() && self.attached.is_empty())
+        else {
+            return;
+        };
         let x = &body.state.x;
         let mean = body.state.v.iter().sum::<Vec3>() / x.len() as f64;
         let points = problem.model.surface.nodes.iter().map(|&n| x[n as usize]);
