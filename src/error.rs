@@ -17,12 +17,12 @@ pub enum BodyError {
         /// Number of vertices of the body.
         vertices: usize,
     },
-    /// A state of another mesh.
-    #[error("the state has {vertices} vertices, the body {expected}")]
+    /// A state of another mesh, or lists of vertices to attach that do not go together.
+    #[error("{vertices} vertices are given where {expected} are expected")]
     WrongSize {
-        /// Vertices of the state.
+        /// Vertices of the state, or of the list.
         vertices: usize,
-        /// Vertices of the body.
+        /// Vertices of the body, or of the other list.
         expected: usize,
     },
     /// The vertex is inside of the body.

@@ -21,7 +21,7 @@ fn right(body: &DeformableBody) -> Vec<usize> {
 }
 
 #[test]
-fn tied_to_the_world_is_as_good_as_pinned() {
+fn attached_to_the_world_is_as_good_as_pinned() {
     let mut physics = PhysicsWorld::new();
     let mut world = DeformableWorld::new();
     let pinned = world.insert(slab().pinned(|x| x.x < -0.199)).unwrap();
@@ -226,7 +226,7 @@ fn attachment_of_infinite_compliance_holds_nothing_and_disturbs_nothing() {
 }
 
 #[test]
-fn breaking_wakes_what_sleeps_on_it_and_so_does_removing_what_it_is_tied_to() {
+fn breaking_wakes_what_sleeps_on_it_and_so_does_removing_what_it_is_attached_to() {
     for breaks in [true, false] {
         let mut physics = PhysicsWorld::new();
         let anchor = physics.insert_body(RigidBodyBuilder::fixed().translation(Vector::Y));

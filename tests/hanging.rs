@@ -297,7 +297,7 @@ fn a_ball_joint_keeps_its_length_while_a_soft_load_swings() {
 }
 
 #[test]
-fn a_swing_with_a_load_that_touches_what_it_is_tied_to_gains_no_energy() {
+fn a_swing_with_a_load_that_touches_what_it_is_attached_to_gains_no_energy() {
     let (_, gained) = swing(Some(0.0));
     assert!(gained < TIMING, "{gained} J");
 }

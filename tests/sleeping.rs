@@ -153,7 +153,7 @@ fn a_tower_of_soft_and_rigid_boxes_ends_asleep() {
 }
 
 #[test]
-fn bodies_tied_to_one_another_wake_together() {
+fn bodies_attached_to_one_another_wake_together() {
     // Two slabs attached end to end, the first over a support that the second does not touch.
     let mut physics = PhysicsWorld::new();
     let support = RigidBodyBuilder::fixed().translation(Vector::new(-0.1, -0.55, 0.0));

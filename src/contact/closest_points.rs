@@ -92,7 +92,7 @@ impl Detector {
     /// Contacts inside the segments of rods.
     pub(super) fn detect_segments(&mut self, scene: &PairScene<'_>, constraints: &mut Vec<Constraint>) {
         let surface = &scene.model.surface;
-        let alone = surface.edge_triangles.iter().enumerate().filter(|(_, endpoints)| endpoints[0] == NONE);
+        let alone = surface.edge_triangles.iter().enumerate().filter(|(_, sides)| sides[0] == NONE);
         for (e, _) in alone {
             let s = surface.edges[e].map(|n| surface.index_of_node[n as usize] as usize);
             let ends = s.map(|s| self.local[s]);

@@ -34,7 +34,7 @@ pub(crate) struct Detector {
     /// Corners of the obstacle, and which triangle each stands on.
     corners: Vec<(u32, Vec3)>,
     pub(super) standing: Vec<(usize, SurfacePoint)>,
-    /// Closest points, kept from the last step and new: feature, slot, constraint.
+    /// Closest points, kept from the last step and new: feature, slot, point.
     pub(super) points: Vec<(Feature, u32, SurfacePoint)>,
 }
 
@@ -210,12 +210,12 @@ impl Detector {
                 let [a, b, c] = corners;
                 let corners = if turned { [a, c, b] } else { corners };
                 let found = corner_on_triangle(scene.obstacle, corner, &corners, reach, &scene.scales);
-                let Some((mut weights, constraint)) = found else { continue };
+                let Some((mut weights, nearest)) = found else { continue };
                 if turned {
                     weights.swap(1, 2);
                 }
-                if best.is_none_or(|(_, _, b)| constraint.gap.abs() < b.gap.abs()) {
-                    best = Some((t, weights, constraint));
+                if best.is_none_or(|(_, _, b)| nearest.gap.abs() < b.gap.abs()) {
+                    best = Some((t, weights, nearest));
                 }
             }
             if let Some((t, weights, found)) = best {

@@ -21,12 +21,12 @@ const LEADS_OUT: f64 = 0.5;
 const HALVINGS: usize = 24;
 /// Sine below which two directions count as parallel.
 const PARALLEL: f64 = 1.0e-3;
-/// Nearer to the node than this part of the edge the node's own constraint serves.
+/// Nearer to the node than this part of the edge the node's own contact serves.
 const AT_NODE: f64 = 1.0e-3;
 
-/// The point of the body edge from `inner`, whose constraint `on_face` is with a plane face, to `outer`,
+/// The point of the body edge from `inner`, whose nearest point `on_face` is with a plane face, to `outer`,
 /// beyond that face, where the edge passes under the face's rim: its place on the edge (0 at
-/// `inner`) and its constraint. `outward` is the body's normal at the edge.
+/// `inner`) and the nearest point there. `outward` is the body's normal at the edge.
 pub(crate) fn rim_crossing(
     obstacle: &Obstacle,
     on_face: &SurfacePoint,
@@ -54,12 +54,12 @@ pub(crate) fn rim_crossing(
     }
     let p = at(over);
     let gap = on_face.normal.dot(&(p - on_face.point));
-    let constraint = SurfacePoint { point: p - on_face.normal * gap, gap, ..*on_face };
+    let nearest = SurfacePoint { point: p - on_face.normal * gap, gap, ..*on_face };
     let found = over > AT_NODE && gap > -2.0 * scales.shift;
-    found.then(|| across_both(obstacle, &constraint, inner, outer, scales).unwrap_or((over, constraint)))
+    found.then(|| across_both(obstacle, &nearest, inner, outer, scales).unwrap_or((over, nearest)))
 }
 
-/// The same point and constraint across both edges, the body's and the one that the face shares with another: pushed out of one
+/// The same point, and the nearest one across both edges, the body's and the one that the face shares with another: pushed out of one
 /// face only, the edge would slip around the other. `None` where that would lead into one of the faces.
 fn across_both(
     obstacle: &Obstacle,
@@ -116,7 +116,7 @@ pub(crate) fn corners_in(obstacle: &Obstacle, region: &Aabb, found: &mut Vec<(u3
     }
 }
 
-/// The constraint of an obstacle's corner on a triangle of the body with these `corners`, and the weights
+/// The nearest point of an obstacle's corner on a triangle of the body with these `corners`, and the weights
 /// of their nodes in it; `None` if the corner is not over the triangle, or further than `reach` from
 /// it, or the triangle is the back of a body so thin that the corner is near it from the other side.
 pub(crate) fn corner_on_triangle(
@@ -132,9 +132,9 @@ pub(crate) fn corner_on_triangle(
         return None;
     }
     let weights = barycentric(corners, corner)?;
-    let constraint = SurfacePoint { point: *corner, normal: -outward, gap, flat: false };
-    (weights.iter().all(|w| *w >= 0.0) && leads_out(obstacle, corner, &constraint.normal, scales))
-        .then_some((weights, constraint))
+    let nearest = SurfacePoint { point: *corner, normal: -outward, gap, flat: false };
+    (weights.iter().all(|w| *w >= 0.0) && leads_out(obstacle, corner, &nearest.normal, scales))
+        .then_some((weights, nearest))
 }
 
 /// Whether an obstacle can press at its corner along a normal: whether that leads out of it.
@@ -160,7 +160,7 @@ mod tests {
     }
 
     proptest! {
-        /// A body edge lies over an edge of a box, sloping by any angle: its constraint is across both, at their distance,
+        /// A body edge lies over an edge of a box, sloping by any angle: its contact is across both, at their distance,
         /// whichever of its ends comes first.
         #[test]
         fn edges_over_edges_push_across_both(angle in 0.1..1.4f64, along in -2.0..2.0f64, gap in -2e-3..2e-3f64, place in 0.3..0.7f64) {
@@ -177,9 +177,9 @@ mod tests {
                 let on_face = surface_point(&cuboid, &(ends[inner] + face * 0.01), &outward, &SCALES).unwrap();
                 prop_assert!(on_face.flat && (on_face.normal - face).norm() < 1e-6);
                 let found = rim_crossing(&cuboid, &on_face, &ends[inner], &ends[1 - inner], &outward, &SCALES);
-                let Some((t, constraint)) = found else { return Err(TestCaseError::reject("looks away or deep")) };
-                prop_assert!((constraint.normal - normal).norm() < 1e-6, "{}", constraint.normal);
-                prop_assert!((constraint.gap - gap).abs() < 1e-6 && (t - place).abs() < 1e-5, "{} {}", constraint.gap, t);
+                let Some((t, nearest)) = found else { return Err(TestCaseError::reject("looks away or deep")) };
+                prop_assert!((nearest.normal - normal).norm() < 1e-6, "{}", nearest.normal);
+                prop_assert!((nearest.gap - gap).abs() < 1e-6 && (t - place).abs() < 1e-5, "{} {}", nearest.gap, t);
             }
         }
 
@@ -194,8 +194,8 @@ mod tests {
             let film = |depth: f64| [-u - v, u - v, v].map(|d| corner - up * depth + d * 0.1);
             let [a, b, c] = film(thickness);
             let (upper, lower) = (film(0.0), [a, c, b]);
-            let (weights, constraint) = corner_on_triangle(&cuboid, &corner, &upper, 0.05, &SCALES).unwrap();
-            prop_assert!((constraint.normal + up).norm() < 1e-6 && constraint.gap.abs() < 1e-6);
+            let (weights, nearest) = corner_on_triangle(&cuboid, &corner, &upper, 0.05, &SCALES).unwrap();
+            prop_assert!((nearest.normal + up).norm() < 1e-6 && nearest.gap.abs() < 1e-6);
             prop_assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-6);
             prop_assert!(corner_on_triangle(&cuboid, &corner, &lower, 0.05, &SCALES).is_none());
         }

@@ -276,7 +276,7 @@ proptest! {
 
     /// The force of a motor's constraint, left to itself, is −k(q − q*) + d q̇*, of its model's mass.
     #[test]
-    fn a_motors_row_has_the_force_of_its_formula(
+    fn a_motors_constraint_has_the_force_of_its_formula(
         at in vector(), turn in vector(), q in -1.0..1.0f64, target in -1.0..1.0f32, speed in -1.0..1.0f32,
         by_force in any::<bool>(),
     ) {

@@ -10,7 +10,7 @@ use crate::solver::BodyProblem;
 
 /// How far from an obstacle tunnelling nodes are stopped, in mean edges.
 const CLEARANCE: f64 = 1.0e-3;
-/// Depth, in mean edges, at which a node of the surface without a contact counts as crossing.
+/// Depth, in mean edges, at which a node of the surface without a contact counts as tunnelling.
 const MISSED: f64 = 0.05;
 
 /// Where the nodes of a body are stopped.
@@ -37,7 +37,7 @@ impl TunnellingStops {
         self.touching.sort_unstable();
     }
 
-    /// Looks where the step has led nodes of a body into obstacles; of one that has given the step up and is not pinned,
+    /// Looks where the step has led nodes of a body into obstacles; of one whose step is rejected and that is not pinned,
     /// shifted out as a rigid body. Returns the energy \[J\] that it takes to stop them.
     pub fn find<'a>(
         &mut self,

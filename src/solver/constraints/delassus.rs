@@ -24,7 +24,7 @@ pub(crate) struct Delassus {
 pub(crate) struct ContactRows<'a> {
     pub constraints: &'a [Constraint],
     pub geometry: &'a [ConstraintGeometry],
-    /// First constraint of each contact in W, and the number of constraints last.
+    /// First row of each contact in W, and the number of rows last.
     pub offsets: &'a [usize],
     pub groups: &'a ContactGroups,
 }
@@ -86,12 +86,12 @@ impl Delassus {
                 let from = if gi == gj { j } else { groups.starts[gi] };
                 for i in from..groups.starts[gi + 1] {
                     let block = between.contacts(&self.jacobian[i], &self.jacobian[j]);
-                    let (constraint, column) = (offsets[i] - first_row, offsets[j] - first_column);
+                    let (row, column) = (offsets[i] - first_row, offsets[j] - first_column);
                     for c in 0..constraints[j].dimension() {
                         for r in 0..constraints[i].dimension() {
-                            values[(column + c) * m + constraint + r] = block[(r, c)];
+                            values[(column + c) * m + row + r] = block[(r, c)];
                             if gi == gj {
-                                values[(constraint + r) * m + column + c] = block[(r, c)];
+                                values[(row + r) * m + column + c] = block[(r, c)];
                             }
                         }
                     }

@@ -102,8 +102,8 @@ impl ContactGroups {
         eliminated.clear();
         eliminated.resize(groups, false);
         degrees.clear();
-        for constraint in adjacent.chunks(groups.max(1)) {
-            degrees.push(constraint.iter().zip(&*sizes).filter(|(a, _)| **a).map(|(_, size)| size).sum());
+        for row in adjacent.chunks(groups.max(1)) {
+            degrees.push(row.iter().zip(&*sizes).filter(|(a, _)| **a).map(|(_, size)| size).sum());
         }
         rank.clear();
         rank.resize(groups, 0);

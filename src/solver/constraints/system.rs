@@ -311,14 +311,14 @@ impl ContactSystem {
 
     /// Gap \[m\] of contact `i` at the end of the step.
     pub fn final_gap(&self, i: usize) -> f64 {
-        let to_goal = match i.checked_sub(self.active) {
+        let above_target = match i.checked_sub(self.active) {
             Some(place) => self.open[place],
             None => {
                 let normal = self.problem.offsets[i];
                 self.g_free[normal] + self.slips[normal]
             }
         };
-        to_goal - self.constraints[i].target_gap + self.constraints[i].gap
+        above_target - self.constraints[i].target_gap + self.constraints[i].gap
     }
 
     /// Adds what the contacts do to the proxies over the step.
