@@ -1,16 +1,12 @@
 //! Spherical joints, ropes and springs that carry soft bodies, and that soft bodies carry.
 //!
-//! Tolerances of forces are those of `tests/joints.rs`: means over the last second of what stands still.
+//! Tolerances of forces are those of `tests/common/joints.rs`: means over the last second of what stands still.
 mod common;
+use common::joints::{H, STATIC, STILL, is_near};
 use common::*;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 
-const H: f32 = 1.0 / 60.0;
-/// Speed of what stands still [m/s].
-const STILL: f64 = 1e-4;
-/// Relative tolerance of forces against statics: twice 2·STILL/g.
-const STATIC: f64 = 5e-5;
 const PLATE: f64 = 5.0;
 const WEIGHT: f64 = 50.0;
 
@@ -24,11 +20,6 @@ fn rigid_box(physics: &mut PhysicsWorld, at: Vector, half: Vector, mass: f64) ->
 fn fastest(physics: &PhysicsWorld, world: &DeformableWorld) -> f64 {
     let rigid = physics.bodies.iter().map(|(_, b)| f64::from(b.linvel().length()));
     rigid.chain(world.bodies.iter().map(|(_, b)| b.max_speed())).fold(0.0, f64::max)
-}
-
-fn is_near(what: &str, found: f64, expected: f64, tolerance: f64) {
-    println!("{what}: {found} against {expected}, off by {:.1e}", found / expected - 1.0);
-    assert!((found / expected - 1.0).abs() < tolerance, "{what}: {found} against {expected}");
 }
 
 /// A weight on a joint under a plate that is glued below a soft block, which is pinned at its top.

@@ -9,7 +9,7 @@
 use super::obstacle::Obstacle;
 use super::shape_table::Solidity;
 use crate::math::{Vec3, from_real, to_real};
-use parry3d::shape::FeatureId;
+use parry3d::shape::{FeatureId, TriMesh};
 
 /// In the obstacle's frame.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +32,8 @@ pub(crate) struct Scales {
     pub shift: f64,
 }
 
+/// Sine below which a direction counts as a normal: f32 places of a metre, seen from a shift of millimetres, give 1e-5.
+const STRAIGHT: f64 = 1.0e-4;
 /// Cosine beyond which a normal counts as facing the body's surface.
 const FACING: f64 = -0.1;
 
@@ -90,6 +92,11 @@ pub(crate) fn towards_surface(obstacle: &Obstacle, p: &Vec3, band: f64) -> Optio
     (hit.point - p).try_normalize(band)
 }
 
+/// The point of the surface nearest to a point outside.
+pub(crate) fn foot(obstacle: &Obstacle, p: &Vec3) -> Option<Vec3> {
+    project(obstacle, p).filter(|hit| !hit.inside).map(|hit| hit.point)
+}
+
 /// Whether the point of the face's plane below `p` belongs to the face: whether the face of
 /// `on_face` is what `p`, lifted off its plane, projects onto.
 pub(crate) fn is_over_face(obstacle: &Obstacle, on_face: &SurfacePoint, p: &Vec3, scales: &Scales) -> bool {
@@ -140,6 +147,7 @@ fn project(obstacle: &Obstacle, p: &Vec3) -> Option<Projection> {
         Some(from_real(half_space.normal).normalize())
     });
     let direction = (distance > 0.0).then(|| offset / distance);
+    let face = face.or_else(|| face_at_border(core.as_trimesh()?, projection.subshape, &direction?));
     if radius == 0.0 {
         return Some(Projection { point, inside: projection.is_inside, distance, direction, face });
     }
@@ -157,6 +165,13 @@ fn project(obstacle: &Obstacle, p: &Vec3) -> Option<Projection> {
         direction: (depth != 0.0).then(|| if depth > 0.0 { -outward } else { outward }),
         face: face.filter(|n| n.dot(&outward) > 0.999),
     })
+}
+
+/// Of a foot on the border of a mesh's triangle the triangle's normal, if the foot is straight below the point: within a
+/// flat floor of many triangles such a point touches a face like any other.
+fn face_at_border(mesh: &TriMesh, triangle: u32, direction: &Vec3) -> Option<Vec3> {
+    let normal = from_real(mesh.triangle(triangle).normal()?);
+    (normal.cross(direction).norm() < STRAIGHT).then(|| normal.normalize())
 }
 
 /// The exact normal of the face if that is what the direction means, up to sign.

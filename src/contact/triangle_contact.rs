@@ -6,7 +6,7 @@
 //! apart and the direction between them is sound, and the gap without the shift.
 
 use super::obstacle::Obstacle;
-use super::surface_point::{Scales, SurfacePoint};
+use super::surface_point::{Scales, SurfacePoint, foot};
 use crate::math::{Vec3, from_real, to_real};
 use parry3d::math::Pose;
 use parry3d::query::{ClosestPoints, closest_points};
@@ -23,6 +23,9 @@ pub(crate) struct TrianglePoint {
 const CORNER: f64 = 1.0e-3;
 /// Cosine beyond which a normal faces the triangle.
 const FACING: f64 = -0.05;
+/// What the projection of a closest point has to be nearer by to stand in for parry's other one. An edge parallel to a mesh
+/// 5 mm below has answers 1.007 times as far and 7° askew.
+const NEARER: f64 = 0.9999;
 /// Cosine beyond which two constraints push the same way.
 const PARALLEL: f64 = 0.9;
 
@@ -45,7 +48,12 @@ pub(crate) fn triangle_point<'a>(
     let Ok(ClosestPoints::WithinMargin(on_triangle, on_obstacle)) = found else {
         return None;
     };
-    let (on_triangle, point) = (from_real(on_triangle), from_real(on_obstacle));
+    let (on_triangle, mut point) = (from_real(on_triangle), from_real(on_obstacle));
+    if let Some(foot) = foot(obstacle, &on_triangle)
+        && (on_triangle - foot).norm() < NEARER * (on_triangle - point).norm()
+    {
+        point = foot;
+    }
     let normal = (on_triangle - point).try_normalize(scales.band)?;
     if normal.dot(&outward) > FACING {
         return None;
