@@ -1,0 +1,123 @@
+//! The scenes.
+
+use crate::engines::{Rigid, Scene, Soft, Way};
+use crate::random::Random;
+use foible3d::prelude::*;
+use rapier3d::prelude::*;
+use std::sync::Arc;
+
+const H: f32 = 1.0 / 60.0;
+/// Seconds of computing that a scene may take in either engine.
+const CAP: f64 = 60.0;
+
+pub fn cube(half: f64, cells: [usize; 3]) -> Arc<TetMesh> {
+    Arc::new(TetMesh::cuboid([half; 3], cells).expect("a valid lattice"))
+}
+
+pub fn wall(at: Vector, half: Vector) -> Rigid {
+    Rigid::new(RigidBodyBuilder::fixed().translation(at), ColliderBuilder::cuboid(half.x, half.y, half.z))
+}
+
+pub fn floor() -> Rigid {
+    wall(Vector::Y * -0.5, Vector::new(20.0, 0.5, 20.0))
+}
+
+/// Cubes of 625 tets and 0.2 m dropped, nine to a layer, into a box 1.3 m wide.
+pub fn heap(count: usize) -> Scene {
+    const WIDE: f32 = 1.3;
+    let mesh = cube(0.1, [5; 3]);
+    let mut random = Random::new(7);
+    let place = |k: usize, random: &mut Random| {
+        let (column, layer) = (k % 9, (k / 9) as f32);
+        // 0.42 m apart: cubes of 0.35 m across in any orientation, and what they are off.
+        let grid = Vector::new((column % 3) as f32 - 1.0, 0.0, (column / 3) as f32 - 1.0) * 0.42;
+        let off = Vector::new(random.within(0.03), random.within(0.01), random.within(0.03));
+        Pose::new(grid + off + Vector::Y * (0.25 + 0.38 * layer), random.turn())
+    };
+    let high = 1.0 + 0.25 * (count / 9) as f32;
+    let side = WIDE / 2.0 + 0.25;
+    let mut rigid = vec![floor()];
+    for sign in [-1.0, 1.0] {
+        rigid.push(wall(Vector::new(sign * side, high, 0.0), Vector::new(0.25, high, 2.0)));
+        rigid.push(wall(Vector::new(0.0, high, sign * side), Vector::new(2.0, high, 0.25)));
+    }
+    Scene {
+        name: format!("heap of {count} cubes"),
+        soft: (0..count).map(|k| Soft::new(&mesh, place(k, &mut random))).collect(),
+        rigid,
+        dt: vec![H],
+        steps: 180,
+        prepared: true,
+        cap: CAP,
+    }
+}
+
+/// The step at which the capsule sets out.
+pub const PINCH_OUT: usize = 60;
+
+/// A capsule comes down at 5 m/s on a cube of 0.4 m, to half its height, and goes back.
+pub fn pinch() -> Scene {
+    const SPEED: f32 = 5.0;
+    const WAY: usize = 6;
+    let radius = 0.05;
+    // Six steps above where it turns.
+    let start = 0.2 + SPEED * H * WAY as f32 + radius;
+    let body = RigidBodyBuilder::kinematic_velocity_based().translation(Vector::Y * start);
+    let mut capsule = Rigid::new(body, ColliderBuilder::capsule_x(0.4, radius));
+    let at = [PINCH_OUT, PINCH_OUT + WAY, PINCH_OUT + 2 * WAY];
+    capsule.way = Some(Way { velocity: Vector::Y * -SPEED, at });
+    Scene {
+        name: "pinch at 5 m/s".into(),
+        soft: vec![Soft::new(&cube(0.2, [4; 3]), Pose::from_translation(Vector::Y * 0.2))],
+        rigid: vec![floor(), capsule],
+        dt: vec![H],
+        steps: 180,
+        prepared: true,
+        cap: CAP,
+    }
+}
+
+/// A cube dropped flat by 0.3 m, nothing made ahead.
+pub fn first_touch(cells: usize) -> Scene {
+    let mesh = cube(0.2, [cells; 3]);
+    Scene {
+        name: format!("first touch, {} tets", mesh.tetrahedra().len()),
+        soft: vec![Soft::new(&mesh, Pose::from_translation(Vector::Y * 0.5))],
+        rigid: vec![floor()],
+        dt: vec![H],
+        steps: 120,
+        prepared: false,
+        cap: CAP / 3.0,
+    }
+}
+
+/// A cube of 1920 tets that swings from an edge, or tumbles onto a floor, for three seconds: at 1/60 s, or by a
+/// pattern of long and short steps.
+pub fn variable_step(swings: bool, varies: bool) -> Scene {
+    const LONG: f32 = 1.0 / 30.0;
+    const SHORT: f32 = 1.0 / 144.0;
+    let mesh = cube(0.2, [8, 8, 6]);
+    let mut soft = Soft::new(&mesh, Pose::new(Vector::Y * 0.6, Vector::new(0.3, 0.2, 0.5)));
+    let mut rigid = vec![floor()];
+    if swings {
+        let held = |p: &[f64; 3]| p[0] < -0.2 + 1e-6 && p[1] > 0.2 - 1e-6;
+        soft.pinned = (0..mesh.vertices().len()).filter(|&v| held(&mesh.vertices()[v])).collect();
+        soft.pose = Pose::from_translation(Vector::Y * 2.0);
+        rigid.clear();
+    }
+    let what = if swings { "swings" } else { "lands" };
+    // 150 steps of the pattern last as long as 180 of 1/60 s, within 0.7 %.
+    let (dt, steps, how) = match varies {
+        true => (vec![SHORT, LONG, SHORT, SHORT, LONG, LONG], 150, "1/144 and 1/30 s"),
+        false => (vec![H], 180, "1/60 s"),
+    };
+    Scene {
+        name: format!("{what}, {how}"),
+        soft: vec![soft],
+        rigid,
+        dt,
+        steps,
+        prepared: true,
+        cap: CAP / 3.0,
+    }
+}
