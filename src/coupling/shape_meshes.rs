@@ -112,7 +112,9 @@ fn corners_of(mesh: &SharedShape) -> Vec<u32> {
         let normal = (b - a).cross(c - a).normalize_or_zero();
         for k in 0..3 {
             let (i, j) = (triangle[k], triangle[(k + 1) % 3]);
-            normals[i as usize].push(normal);
+            if normal != Vector::ZERO {
+                normals[i as usize].push(normal);
+            }
             *uses.entry([i.min(j), i.max(j)]).or_default() += 1;
         }
     }
@@ -129,7 +131,10 @@ fn corners_of(mesh: &SharedShape) -> Vec<u32> {
 fn spans_space(normals: &[Vector]) -> bool {
     let first = normals[0];
     let across = normals.iter().map(|n| first.cross(*n)).max_by(|a, b| a.length().total_cmp(&b.length()));
-    let Some(across) = across.filter(|a| a.length() > COPLANAR) else { return false };
+    let Some(across) = across.filter(|a| a.length() > COPLANAR) else {
+        // Folded flat on itself.
+        return normals.iter().any(|n| first.dot(*n) < 0.0);
+    };
     let along = across.normalize_or_zero();
     normals.iter().any(|n| n.dot(along).abs() > COPLANAR)
 }
@@ -137,6 +142,7 @@ fn spans_space(normals: &[Vector]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use parry3d::shape::Cuboid;
 
     fn corners(shape: SharedShape) -> Vec<Vector> {
         let (mesh, corners) = ShapeMeshes::default().mesh_of(shape);
@@ -176,5 +182,16 @@ mod tests {
         });
         let found = corners(SharedShape::trimesh(vertices, triangles.collect()).unwrap());
         assert_eq!(found.len(), 12);
+    }
+
+    #[test]
+    fn slivers_and_folds_hide_no_corners() {
+        let (points, mut triangles) = Cuboid::new(Vector::splat(0.5)).to_trimesh();
+        triangles.splice(0..0, (0..8).map(|n| [n, n, (n + 1) % 8]));
+        assert_eq!(corners(SharedShape::trimesh(points, triangles).unwrap()).len(), 8);
+        // Both sides of a square, without thickness.
+        let square = [Vector::ZERO, Vector::X, Vector::X + Vector::Y, Vector::Y].to_vec();
+        let sides = vec![[0, 1, 2], [0, 2, 3], [0, 2, 1], [0, 3, 2]];
+        assert_eq!(corners(SharedShape::trimesh(square, sides).unwrap()).len(), 4);
     }
 }
