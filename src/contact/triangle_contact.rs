@@ -35,7 +35,7 @@ const PARALLEL: f64 = 0.9;
 pub(crate) fn triangle_point<'a>(
     obstacle: &Obstacle,
     corners: &[Vec3; 3],
-    known: impl Iterator<Item = &'a SurfacePoint>,
+    known: impl Iterator<Item = &'a SurfacePoint> + Clone,
     reach: f64,
     scales: &Scales,
 ) -> Option<TrianglePoint> {
@@ -48,26 +48,25 @@ pub(crate) fn triangle_point<'a>(
     let Ok(ClosestPoints::WithinMargin(on_triangle, on_obstacle)) = found else {
         return None;
     };
-    let (on_triangle, mut point) = (from_real(on_triangle), from_real(on_obstacle));
-    if let Some(foot) = foot(obstacle, &on_triangle)
-        && (on_triangle - foot).norm() < NEARER * (on_triangle - point).norm()
-    {
-        point = foot;
-    }
-    let normal = (on_triangle - point).try_normalize(scales.band)?;
-    if normal.dot(&outward) > FACING {
-        return None;
-    }
+    let (on_triangle, point) = (from_real(on_triangle), from_real(on_obstacle));
     let weights = snapped(barycentric(&back, &on_triangle)?);
     if weights.iter().filter(|w| **w > 0.0).count() < 2 {
         return None;
     }
     let here = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
-    let gap = normal.dot(&(here - point));
-    let surface = SurfacePoint { point, normal, gap, flat: false };
-    let parallel = known.filter(|k| k.normal.dot(&normal) > PARALLEL);
-    let said = parallel.map(|k| k.gap).fold(f64::INFINITY, f64::min);
-    (gap < reach && gap < said - scales.band).then_some(TrianglePoint { weights, surface })
+    let contact_at = |point: Vec3| {
+        let normal = (on_triangle - point).try_normalize(scales.band)?;
+        let gap = normal.dot(&(here - point));
+        let parallel = known.clone().filter(|k| k.normal.dot(&normal) > PARALLEL);
+        let said = parallel.map(|k| k.gap).fold(f64::INFINITY, f64::min);
+        let is_new = gap < reach && gap < said - scales.band && normal.dot(&outward) <= FACING;
+        is_new.then_some(SurfacePoint { point, normal, gap, flat: false })
+    };
+    let found = contact_at(point)?;
+    let distance = (on_triangle - point).norm();
+    let nearer = foot(obstacle, &on_triangle).filter(|f| (on_triangle - f).norm() < NEARER * distance);
+    let surface = nearer.map_or(Some(found), contact_at)?;
+    Some(TrianglePoint { weights, surface })
 }
 
 /// Weights of the corners at the foot of `p` in the plane of a triangle.
