@@ -1,5 +1,9 @@
 //! The rooms of the crate and who may know whom, read off the `use` lines; the size of files and functions.
 
+#[path = "common/sources.rs"]
+mod sources;
+
+use sources::sources;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -27,27 +31,14 @@ const SOLVER: [&[&str]; 7] =
 const LONGEST_FILE: usize = 400;
 const LONGEST_FUNCTION: usize = 60;
 
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            found.push(path);
-        }
-    }
-}
-
 /// Path below a folder of the package, and text, of every source file in it.
 fn whole_files(folder: &str) -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
-    let mut found = Vec::new();
-    sources(&root, &mut found);
     let read = |path: &PathBuf| {
         let name = path.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
         (name, fs::read_to_string(path).unwrap())
     };
-    found.iter().map(read).collect()
+    sources(folder).iter().map(read).collect()
 }
 
 /// Path below `src` and text of every source file, without its test module.

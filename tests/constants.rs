@@ -1,18 +1,11 @@
 //! Every tuning constant of the crate stands in `docs/constants.md`, with its file and its value.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+#[path = "common/sources.rs"]
+mod sources;
 
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            found.push(path);
-        }
-    }
-}
+use sources::sources;
+use std::fs;
+use std::path::Path;
 
 /// Name and value of every constant number of a source, its tests left out.
 fn constants(source: &str) -> Vec<(String, String)> {
@@ -34,10 +27,8 @@ fn every_constant_is_listed_with_its_file_and_value() {
     let table = fs::read_to_string(root.join("docs/constants.md")).unwrap();
     // Names of things, not tunings.
     let exempt = ["NONE", "FIRST_POINT", "PADDING"];
-    let mut found = Vec::new();
-    sources(&root.join("src"), &mut found);
     let (mut listed, mut missing) = (0, Vec::new());
-    for path in found {
+    for path in sources("src") {
         let file = path.strip_prefix(root.join("src")).unwrap().to_string_lossy().replace('\\', "/");
         if file.ends_with("tests.rs") {
             continue;

@@ -1,31 +1,23 @@
 //! Whoever is cited is listed in `docs/references.md`, whoever is listed there is cited, and the files that the documents
 //! name exist.
 
+#[path = "common/sources.rs"]
+mod sources;
+
+use sources::sources;
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 fn text(path: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
     fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Text of every source file below a folder.
-fn sources(folder: &Path, found: &mut Vec<String>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            found.push(fs::read_to_string(path).unwrap());
-        }
-    }
-}
-
+/// Text of every source file below some folders.
 fn sources_of(folders: &[&str]) -> Vec<String> {
-    let mut found = Vec::new();
-    folders.iter().for_each(|f| sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join(f), &mut found));
-    found
+    let read = |path: PathBuf| fs::read_to_string(path).unwrap();
+    folders.iter().flat_map(|f| sources(f)).map(read).collect()
 }
 
 /// A text in one line, as tags may go over the end of a comment's line.

@@ -11,8 +11,8 @@ use rapier3d::math::{Pose, Vector};
 pub enum AttachTo {
     /// The world: where the vertices are now. [`DeformableAttachment::translate`] moves them.
     World,
-    /// A rigid body or multibody link, at the places that the vertices have on it now, given its pose. The vertices do not
-    /// collide with that body, unless they hang on cables.
+    /// A rigid body or multibody link, at the places that the vertices have on it now, given its pose. Up to a
+    /// compliance of 1e-8 m/N and without a length, the vertices do not collide with that body.
     RigidBody(RigidBodyHandle, Pose),
     /// Vertices of another deformable body, one by one: they are drawn together.
     Deformable(DeformableBodyHandle, Vec<usize>),

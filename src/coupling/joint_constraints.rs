@@ -79,9 +79,8 @@ pub(super) fn joint_constraints(
         let coordinate = distance(coupled, ends, &frame1, &frame2);
         let first = coupled.bits().trailing_zeros() as usize;
         // Rapier's coupled axes have no lower limit: a rope lets what it holds pass its anchor.
-        let mut above = *joint;
-        above.limits[first].min = -f32::MAX;
-        limit_constraints(&above, first, &coordinate, constraints);
+        let above = [-f32::MAX, joint.limits[first].max];
+        limit_constraints(joint, first, above, &coordinate, constraints);
         motor_constraint(joint, first, &coordinate, proxies, dt, constraints);
     }
     for axis in 0..6 {
@@ -100,7 +99,8 @@ pub(super) fn joint_constraints(
             constraints.push(constraint);
             continue;
         }
-        limit_constraints(joint, axis, &coordinate, constraints);
+        let limits = [joint.limits[axis].min, joint.limits[axis].max];
+        limit_constraints(joint, axis, limits, &coordinate, constraints);
         motor_constraint(joint, axis, &coordinate, proxies, dt, constraints);
     }
 }
@@ -123,24 +123,24 @@ pub(super) fn drive_constraints(
 fn limit_constraints(
     joint: &GenericJoint,
     axis: usize,
+    [min, max]: [f32; 2],
     coordinate: &Coordinate,
     constraints: &mut Vec<Constraint>,
 ) {
-    let limits = &joint.limits[axis];
-    let half_range = 0.5 * (f64::from(limits.max) - f64::from(limits.min));
+    let half_range = 0.5 * (f64::from(max) - f64::from(min));
     // As rapier: of an angle that does not count turns, a range of a full turn or more is no limit.
     let is_limited = !coordinate.is_wrapped || half_range < PI;
     if !(is_limited && joint.limit_axes.intersects(JointAxesMask::from_bits_truncate(1 << axis))) {
         return;
     }
     // And such an angle is measured from the middle between the limits.
-    let value = coordinate.value_near(0.5 * (f64::from(limits.min) + f64::from(limits.max)));
-    if limits.min > -UNLIMITED {
-        constraints.push(coordinate.constraint(value - f64::from(limits.min), JointRole::LowerLimit));
+    let value = coordinate.value_near(0.5 * (f64::from(min) + f64::from(max)));
+    if min > -UNLIMITED {
+        constraints.push(coordinate.constraint(value - f64::from(min), JointRole::LowerLimit));
     }
-    if limits.max < UNLIMITED {
+    if max < UNLIMITED {
         let reversed = Coordinate { axis: -coordinate.axis, ..*coordinate };
-        constraints.push(reversed.constraint(f64::from(limits.max) - value, JointRole::UpperLimit));
+        constraints.push(reversed.constraint(f64::from(max) - value, JointRole::UpperLimit));
     }
 }
 

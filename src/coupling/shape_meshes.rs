@@ -5,6 +5,7 @@ use parry3d::bounding_volume::Aabb;
 use parry3d::math::{IVector, Vector};
 use parry3d::shape::{SharedShape, TriMeshFlags, TypedShape, Voxels};
 use std::collections::{HashMap, HashSet};
+use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::sync::Arc;
 
 /// The meshes of a world's shapes, made when they are first seen and kept while they are.
@@ -101,42 +102,54 @@ fn grid_point(voxels: &Voxels, at: IVector) -> Vector {
 /// Sine below which triangles count as coplanar: of meshes in single precision.
 const COPLANAR: f32 = 1.0e-3;
 
+/// What the triangles around a vertex say of it.
+#[derive(Clone, Copy, Default)]
+struct Fan {
+    /// Unit normal of the first of them.
+    first: Vector,
+    /// Longest cross product of that with another normal.
+    across: Vector,
+    is_folded: bool,
+    /// Not all normals are across one line.
+    spans_space: bool,
+    /// Hashes of the far ends of edges, by exclusive or: an edge of two triangles cancels itself.
+    parity: u64,
+}
+
 /// Vertices of a mesh that can press a point into a face: all but those within a plane face or along a straight edge of
 /// a surface that goes on around them. Ascending.
 fn corners_of(mesh: &SharedShape) -> Vec<u32> {
     let Some(mesh) = mesh.as_trimesh() else { return Vec::new() };
-    let mut normals: Vec<Vec<Vector>> = vec![Vec::new(); mesh.vertices().len()];
-    let mut uses: HashMap<[u32; 2], u32> = HashMap::new();
-    for triangle in mesh.indices() {
-        let [a, b, c] = triangle.map(|n| mesh.vertices()[n as usize]);
-        let normal = (b - a).cross(c - a).normalize_or_zero();
-        for k in 0..3 {
-            let (i, j) = (triangle[k], triangle[(k + 1) % 3]);
-            if normal != Vector::ZERO {
-                normals[i as usize].push(normal);
+    let normals: Vec<Vector> = mesh.triangles().map(|t| t.scaled_normal().normalize_or_zero()).collect();
+    let hasher = BuildHasherDefault::<DefaultHasher>::default();
+    let mut fans = vec![Fan::default(); mesh.vertices().len()];
+    for (&triangle, &normal) in mesh.indices().iter().zip(&normals) {
+        let [a, b, c] = triangle;
+        for (vertex, ends) in [(a, [b, c]), (b, [c, a]), (c, [a, b])] {
+            let fan = &mut fans[vertex as usize];
+            fan.parity ^= hasher.hash_one(ends[0]) ^ hasher.hash_one(ends[1]);
+            if fan.first == Vector::ZERO {
+                fan.first = normal;
             }
-            *uses.entry([i.min(j), i.max(j)]).or_default() += 1;
+            let across = fan.first.cross(normal);
+            if across.length_squared() > fan.across.length_squared() {
+                fan.across = across;
+            }
+            fan.is_folded |= fan.first.dot(normal) < 0.0;
         }
     }
-    let open = uses.iter().filter(|(_, count)| **count == 1).flat_map(|(edge, _)| *edge);
-    let open: HashSet<u32> = open.collect();
-    let is_corner = |n: &u32| {
-        let own = &normals[*n as usize];
-        !own.is_empty() && (open.contains(n) || spans_space(own))
+    for (triangle, normal) in mesh.indices().iter().zip(&normals) {
+        for &vertex in triangle {
+            let fan = &mut fans[vertex as usize];
+            fan.spans_space |= normal.dot(fan.across.normalize_or_zero()).abs() > COPLANAR;
+        }
+    }
+    let is_corner = |fan: &Fan| {
+        let is_plane = fan.across.length() <= COPLANAR;
+        let has_shape = if is_plane { fan.is_folded } else { fan.spans_space };
+        fan.first != Vector::ZERO && (fan.parity != 0 || has_shape)
     };
-    (0..normals.len() as u32).filter(is_corner).collect()
-}
-
-/// Whether unit normals are neither all along one line nor all across one.
-fn spans_space(normals: &[Vector]) -> bool {
-    let first = normals[0];
-    let across = normals.iter().map(|n| first.cross(*n)).max_by(|a, b| a.length().total_cmp(&b.length()));
-    let Some(across) = across.filter(|a| a.length() > COPLANAR) else {
-        // Folded flat on itself.
-        return normals.iter().any(|n| first.dot(*n) < 0.0);
-    };
-    let along = across.normalize_or_zero();
-    normals.iter().any(|n| n.dot(along).abs() > COPLANAR)
+    (0..).zip(&fans).filter(|(_, fan)| is_corner(fan)).map(|(vertex, _)| vertex).collect()
 }
 
 #[cfg(test)]

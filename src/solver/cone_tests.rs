@@ -36,11 +36,11 @@ enum End {
     Closed,
     Stick,
     Slip,
-    Held,
+    Bilateral,
     AtLimit,
 }
 
-const ENDS: [End; 6] = [End::Open, End::Closed, End::Stick, End::Slip, End::Held, End::AtLimit];
+const ENDS: [End; 6] = [End::Open, End::Closed, End::Stick, End::Slip, End::Bilateral, End::AtLimit];
 
 /// A problem whose solution, with every inequality strict, is known.
 struct Case {
@@ -70,8 +70,8 @@ fn complementary(end: End, numbers: &mut Numbers) -> (Law, Vec<f64>, Vec<f64>) {
             let rubs = friction * force;
             (contact, vec![force, rubs * cos, rubs * sin], vec![friction * gap, -gap * cos, -gap * sin])
         }
-        End::Held if sign > 0.0 => (free, vec![force], vec![0.0]),
-        End::Held => (Law::Bilateral { limit: 1.2 * force }, vec![-force], vec![0.0]),
+        End::Bilateral if sign > 0.0 => (free, vec![force], vec![0.0]),
+        End::Bilateral => (Law::Bilateral { limit: 1.2 * force }, vec![-force], vec![0.0]),
         End::AtLimit => (Law::Bilateral { limit: force }, vec![sign * force], vec![-sign * gap]),
     }
 }
@@ -271,7 +271,7 @@ proptest! {
     fn what_ends_as_expected_takes_one_factor(
         seed in any::<u64>(), groups in 1usize..6, bodies in 2usize..5,
     ) {
-        let linear = [End::Open, End::Closed, End::Stick, End::Held, End::AtLimit];
+        let linear = [End::Open, End::Closed, End::Stick, End::Bilateral, End::AtLimit];
         let mut numbers = Numbers(seed);
         let case = Case::new(groups, bodies, &linear, &mut numbers);
         let problem = &case.grouped;

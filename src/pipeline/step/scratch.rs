@@ -31,7 +31,7 @@ pub(in crate::pipeline) struct StepScratch {
     pub(super) soft_pairs: SoftPairDetection,
     /// Nodes that attachments prescribe.
     pub(super) prescribed: Vec<(DeformableBodyHandle, PrescribedNode)>,
-    /// Nodes that attachments hold to rigid bodies.
+    /// Nodes that attachments hold fast to rigid bodies.
     pub(super) attached: Vec<(DeformableBodyHandle, ProxyId, u32)>,
     /// Constraints of attachments and of contacts between deformables.
     pub(super) linking: Vec<Constraint>,

@@ -32,7 +32,7 @@ pub(super) struct BodyWork {
     distances: Vec<(f32, u32)>,
     /// Nodes that attachments and contacts with other deformables act on.
     pub linked_nodes: Vec<u32>,
-    /// Nodes that attachments hold to a rigid body, by that body's proxy, ascending: they do not collide with it.
+    /// Nodes that attachments hold fast to a rigid body, by that body's proxy, ascending: they do not collide with it.
     pub attached: Vec<(ProxyId, u32)>,
     /// Nodes that attachments prescribe.
     pub prescribed: Vec<PrescribedNode>,
