@@ -28,6 +28,10 @@ pub struct DeformableParameters {
     /// counted from the touched ones outward. Zero leaves these to rapier alone: its contacts are springs
     /// that give way under loads many times the body's own weight.
     pub neighbourhood_bodies: usize,
+    /// Work on the contacts of a crowd, per island and step: products with the Delassus operator, each about a solve of
+    /// all of its bodies; a counted number, so that results do not depend on the machine. What it leaves is overlap,
+    /// which the next steps take up from there.
+    pub contact_products: usize,
     /// Memory \[bytes\] for columns of inverses, kept between steps for contacts.
     pub column_budget: usize,
 }
@@ -39,6 +43,7 @@ impl Default for DeformableParameters {
             max_corrective_velocity: 1.0,
             restitution_threshold: 0.5,
             neighbourhood_bodies: 64,
+            contact_products: 60,
             column_budget: 512 << 20,
         }
     }
@@ -69,6 +74,12 @@ impl DeformableParameters {
         Self { neighbourhood_bodies, ..self }
     }
 
+    /// Sets the work on the contacts of a crowd.
+    #[must_use]
+    pub fn contact_products(self, contact_products: usize) -> Self {
+        Self { contact_products, ..self }
+    }
+
     /// Sets the memory \[bytes\] for columns of inverses.
     #[must_use]
     pub fn column_budget(self, column_budget: usize) -> Self {
@@ -81,6 +92,7 @@ impl DeformableParameters {
             restitution_threshold: self.restitution_threshold.max(0.0),
             // Below 1e-12 there is only rounding; NaN becomes that too.
             tolerance: self.contact_tolerance.max(1e-12),
+            products: self.contact_products,
         }
     }
 }
@@ -119,9 +131,15 @@ pub struct DeformableCounters {
     pub solve_bytes: usize,
     /// Newton steps of the contact problems.
     pub newton_steps: usize,
+    /// Products with the Delassus operators of crowds.
+    pub contact_products: usize,
+    /// Islands whose contacts took all of [`DeformableParameters::contact_products`].
+    pub budgets_reached: usize,
+    /// Largest relative error of contact forces that a crowd was left with.
+    pub contact_error: f64,
     /// Dense factorizations of the contact problems.
     pub contact_factorizations: usize,
-    /// Contact problems that did not reach their tolerance.
+    /// Contact problems that Newton's method did not solve: projected gradients went on.
     pub contact_failures: usize,
     /// Sparse factorizations.
     pub factorizations: usize,
@@ -156,9 +174,12 @@ pub struct DeformableCounters {
 impl DeformableCounters {
     pub(super) fn add(&mut self, report: &IslandReport) {
         self.iterations += report.iterations;
-        self.newton_steps += report.newton_steps;
-        self.contact_factorizations += report.cone_factorizations;
-        self.contact_failures += report.cone_failures;
+        self.contact_products += report.contacts.products;
+        self.budgets_reached += usize::from(report.contacts.is_exhausted);
+        self.contact_error = self.contact_error.max(report.contacts.error);
+        self.newton_steps += report.contacts.newton_steps;
+        self.contact_factorizations += report.contacts.factorizations;
+        self.contact_failures += report.contacts.failures;
         self.elements += report.counters.elements;
         self.solves += report.counters.solves;
         self.solve_bytes += report.counters.solve_bytes;

@@ -88,8 +88,7 @@ impl DeformablePipeline {
             return Err(DeformableBodyError::TimeStep { dt: h });
         }
         for (_, body) in deformables.iter().filter(|(_, b)| b.is_enabled()) {
-            let all = 0..body.model.surface.nodes.len() as u32;
-            self.scratch.factors.prepare(&FactorKey::new(body, h), body, h, all);
+            self.scratch.factors.prepare_surface(&FactorKey::new(body, h), body, h);
             if body.settings().integrator == Integrator::Bdf2 {
                 let h = SECOND_ORDER * h;
                 self.scratch.factors.prepare(&FactorKey::new(body, h), body, h, std::iter::empty());

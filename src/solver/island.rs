@@ -12,7 +12,7 @@ use crate::profiler::timed;
 use crate::solver::acceleration::Accelerator;
 use crate::solver::body_step::{BodyProblem, Factors, NewtonFactors};
 use crate::solver::cone::ConeTolerance;
-use crate::solver::constraints::{ContactSystem, SolveContext};
+use crate::solver::constraints::{Change, ContactSystem, ContactWork, SolveContext};
 
 /// Bodies whose steps depend on one another.
 #[derive(Default)]
@@ -21,28 +21,14 @@ pub(crate) struct Island {
     pub contacts: ContactSystem,
     pub report: IslandReport,
     accelerations: Vec<Accelerator>,
-    assembly: Assembly,
     newton_factors: NewtonFactors,
-}
-
-/// What is to be done to the contact problem before it is solved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-enum Assembly {
-    #[default]
-    Done,
-    /// Frames or dampings are others.
-    Refreshed,
-    /// The contacts are others.
-    Anew,
 }
 
 /// How the step of an island went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct IslandReport {
     pub iterations: usize,
-    pub newton_steps: usize,
-    pub cone_factorizations: usize,
-    pub cone_failures: usize,
+    pub contacts: ContactWork,
     pub counters: SolveCounters,
 }
 
@@ -79,7 +65,6 @@ impl Island {
             body.choose_initial_guess(context.factors.get(body.factor));
         }
         self.contacts.begin(&mut self.bodies, context);
-        self.assembly = Assembly::Anew;
         self.accelerations.resize_with(self.bodies.len(), Accelerator::default);
         self.accelerations.iter_mut().for_each(Accelerator::clear);
         let iterations = self.bodies.iter().map(|b| b.settings.max_iterations).max().unwrap_or(0);
@@ -99,7 +84,7 @@ impl Island {
             if !self.contacts.is_empty() {
                 let turned = self.bodies.iter_mut().filter_map(|b| b.refresh_frame().then_some(()));
                 if turned.count() > 0 {
-                    self.assembly = self.assembly.max(Assembly::Refreshed);
+                    self.contacts.outdate(Change::Frames);
                 }
             }
         }
@@ -118,7 +103,8 @@ impl Island {
             let mut gains = false;
             for index in 0..self.bodies.len() {
                 let body = &self.bodies[index];
-                let is_solved = body.residual() <= FAR_FROM_SOLVED * body.force_scale();
+                let is_solved = self.contacts.work.error <= FAR_FROM_SOLVED
+                    && body.residual() <= FAR_FROM_SOLVED * body.force_scale();
                 if !is_solved && self.would_gain_energy(index, 0.0, context) {
                     self.bodies[index].is_rejected = true;
                     gains = true;
@@ -148,6 +134,8 @@ impl Island {
             }
         }
         self.contacts.scatter_changes(&mut self.bodies);
+        // What is left of the step's would leave between rigid shapes what makes energy.
+        self.contacts.renew_budget();
         let own = Factors { cache: context.factors, newton: &self.newton_factors };
         for (index, body) in self.bodies.iter_mut().enumerate() {
             let factor = own.of(index, body);
@@ -158,7 +146,7 @@ impl Island {
                 body.contact_step(factor);
             }
         }
-        self.assembly = Assembly::Anew;
+        self.contacts.outdate(Change::Contacts);
         self.solve_contacts(context);
         for body in &mut self.bodies {
             if body.is_rejected {
@@ -174,7 +162,7 @@ impl Island {
     /// One iteration.
     fn iterate(&mut self, context: &SolveContext<'_>) -> Outcome {
         if self.newton_factors.refresh(&mut self.bodies, context.factors, &self.contacts.constraints) {
-            self.assembly = self.assembly.max(Assembly::Refreshed);
+            self.contacts.outdate(Change::Factors);
         }
         let mut outcome;
         loop {
@@ -223,7 +211,7 @@ impl Island {
                 break;
             }
             if damped_more {
-                self.assembly = self.assembly.max(Assembly::Refreshed);
+                self.contacts.outdate(Change::Factors);
             }
         }
         for (body, acceleration) in self.bodies.iter_mut().zip(&mut self.accelerations) {
@@ -231,21 +219,6 @@ impl Island {
             body.accept_trial();
         }
         outcome
-    }
-
-    /// Brings W up to date, and the solver's expectation where the problem is another one.
-    fn assemble_contacts(&mut self, context: &SolveContext<'_>) {
-        let assembly = std::mem::take(&mut self.assembly);
-        if assembly == Assembly::Done {
-            return;
-        }
-        let (contacts, bodies) = (&mut self.contacts, &self.bodies);
-        let time = &mut self.report.counters.contact_time;
-        let factors = Factors { cache: context.factors, newton: &self.newton_factors };
-        timed(time, || contacts.assemble(bodies, factors, context));
-        if assembly == Assembly::Anew {
-            contacts.predict(bodies, context);
-        }
     }
 
     /// Solves the contacts at the trial positions and moves the bodies to what comes of it; again for those
@@ -259,26 +232,17 @@ impl Island {
         };
         for round in 0..ROUNDS {
             let slack = if round == 0 { NEARLY_CLOSED } else { OVERLAPPING };
-            if self.contacts.activate(&self.bodies, context, slack) {
-                self.assembly = Assembly::Anew;
-            } else if round > 0 {
+            if !self.contacts.activate(&self.bodies, context, slack) && round > 0 {
                 break;
             }
-            self.assemble_contacts(context);
             let (contacts, bodies) = (&mut self.contacts, &mut self.bodies);
             let time = &mut self.report.counters.contact_time;
-            let (work, changed) = timed(time, || contacts.solve(bodies, context, tolerance));
-            self.report.newton_steps += work.newton_steps;
-            self.report.cone_factorizations += work.factorizations;
-            self.report.cone_failures += work.failures;
-            if !changed {
+            let own = Factors { cache: context.factors, newton: &self.newton_factors };
+            if !timed(time, || contacts.improve(bodies, own, context, tolerance)) {
                 break;
             }
-            let own = Factors { cache: context.factors, newton: &self.newton_factors };
-            for (index, body) in self.bodies.iter_mut().enumerate() {
-                body.contact_step(own.of(index, body));
-            }
         }
+        self.report.contacts = self.contacts.work;
     }
 }
 

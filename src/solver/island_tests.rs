@@ -5,17 +5,18 @@ use super::constraints::{
 };
 use super::island::Island;
 use super::linear::FactorCache;
-use super::tests::{H, prepared};
+pub(super) use super::tests::H;
+use super::tests::prepared;
 use crate::body::{ConstraintKey, Feature, Frames, ObstacleContact, SolverSettings};
 use crate::contact::{Constraint, Endpoint, Law, ProxyId};
 use crate::fem::SystemMatrix;
 use crate::math::{Mat3, Vec3};
 
-const LIMITS: ContactLimits =
-    ContactLimits { recovery_speed: 1.0, restitution_threshold: 0.5, tolerance: 1e-12 };
+pub(super) const LIMITS: ContactLimits =
+    ContactLimits { recovery_speed: 1.0, restitution_threshold: 0.5, tolerance: 1e-12, products: 60 };
 
 /// A bent body with contacts at its lowest nodes.
-fn touching() -> (FactorCache, Island) {
+pub(super) fn touching() -> (FactorCache, Island) {
     let (cache, problem) = prepared(SystemMatrix::RestStiffness, Frames::PerNode, false);
     let mut island = Island::default();
     let nodes: Vec<u32> = problem
@@ -40,7 +41,7 @@ fn touching() -> (FactorCache, Island) {
     (cache, island)
 }
 
-fn plate() -> RigidProxies {
+pub(super) fn plate() -> RigidProxies {
     let plate = RigidProxy::Rigid {
         com: Vec3::new(0.1, -0.3, 0.05),
         inv_mass: Vec3::repeat(1.0 / 30.0),

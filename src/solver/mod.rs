@@ -20,6 +20,8 @@ mod island;
 #[cfg(test)]
 mod cone_tests;
 #[cfg(test)]
+mod gradient_tests;
+#[cfg(test)]
 mod island_tests;
 #[cfg(test)]
 mod tests;

@@ -35,7 +35,7 @@ impl StepScratch {
             };
             counters.factorizations += done.factorizations;
             counters.columns += done.columns + factors.prepare_ahead(done.id, &problem.key.pins, &work.ahead);
-            work.set_factor(done.id);
+            work.set_factor(done.id, done.has_columns);
             true
         });
         if self.works.len() < count {

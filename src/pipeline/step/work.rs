@@ -238,9 +238,10 @@ impl BodyWork {
     }
 
     /// Tells where the body's factor is kept in this step.
-    pub fn set_factor(&mut self, id: FactorId) {
+    pub fn set_factor(&mut self, id: FactorId, has_columns: bool) {
         if let Some(problem) = &mut self.problem {
             problem.factor = id;
+            problem.has_columns = has_columns;
         }
     }
 

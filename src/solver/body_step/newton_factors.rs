@@ -6,7 +6,7 @@ use crate::body::Solver;
 use crate::contact::{Constraint, Endpoint};
 use crate::fem::SystemMatrix;
 use crate::solver::linear::{
-    ComplianceColumns, FactorCache, FactorScratch, Symbolic, SystemFactor, assemble_tangent,
+    CoarseInverse, ComplianceColumns, FactorCache, FactorScratch, Symbolic, SystemFactor, assemble_tangent,
 };
 
 /// Factors of an island's bodies: their own where they have such, else those of the cache.
@@ -17,6 +17,11 @@ pub(crate) struct Factors<'a> {
 }
 
 impl<'a> Factors<'a> {
+    /// Whether the columns of the body's inverse that its contacts want are there.
+    pub fn has_columns(&self, index: usize, body: &BodyProblem) -> bool {
+        body.has_columns || self.newton.made.get(index).is_some_and(Option::is_some)
+    }
+
     /// The factor of the island's body `index`.
     pub fn of(&self, index: usize, body: &BodyProblem) -> &'a SystemFactor {
         let own = self.newton.made.get(index).and_then(Option::as_ref);
@@ -68,10 +73,11 @@ impl NewtonFactors {
         symbolic: &std::sync::Arc<Symbolic>,
         constraints: &[Constraint],
     ) -> Option<SystemFactor> {
-        let factor = [false, true].into_iter().find_map(|projected| {
+        let (factor, coarse) = [false, true].into_iter().find_map(|projected| {
             let (x, pins) = (&body.current.x, &body.key.pins);
             let values = assemble_tangent(&body.elements(), x, projected, pins, body.h(), symbolic);
-            symbolic.factorize(&values, &mut self.scratch).ok()
+            let coarse = CoarseInverse::new(&body.model, pins, symbolic, &values);
+            Some((symbolic.factorize(&values, &mut self.scratch).ok()?, coarse))
         })?;
         let surface = &body.model.surface;
         let mut columns = ComplianceColumns::new(surface, SystemMatrix::RestStiffness);
@@ -89,6 +95,7 @@ impl NewtonFactors {
             system: SystemMatrix::RestStiffness,
             columns,
             clusters: None,
+            coarse,
             serial: u64::MAX - self.count,
         })
     }

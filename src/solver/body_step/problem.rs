@@ -27,6 +27,8 @@ pub(crate) struct BodyProblem {
     pub key: FactorKey,
     /// To be set when the factor is prepared.
     pub factor: FactorId,
+    /// Whether that holds the columns that the contacts want.
+    pub has_columns: bool,
     pub model: Arc<DeformableModel>,
     pub settings: SolverSettings,
     pub(super) material: DeformableMaterial,
@@ -92,6 +94,7 @@ impl BodyProblem {
         let mut problem = Self {
             key: FactorKey::new(body, h),
             factor: FactorId::default(),
+            has_columns: false,
             model: body.model.clone(),
             settings: *body.settings(),
             material: body.material,
@@ -201,13 +204,17 @@ impl BodyProblem {
         Elements { model: &self.model, material: &self.material, activation: self.activation }
     }
 
+    pub fn masses(&self) -> &[f64] {
+        &self.masses
+    }
+
     /// Mass of a node \[kg\].
     pub fn mass(&self, node: usize) -> f64 {
         self.masses[node]
     }
 
     /// Displacement per force over mass of a rigid body, h²/(1 + αh) [s²].
-    pub(super) fn mobility(&self) -> f64 {
+    pub fn mobility(&self) -> f64 {
         self.h * self.h / (1.0 + self.material.mass_damping * self.h)
     }
 
@@ -235,6 +242,16 @@ impl BodyProblem {
     pub fn contact_step(&mut self, factor: &SystemFactor) {
         self.preconditioner.apply(factor, &self.contact_change, &mut self.step);
         self.add_step();
+    }
+
+    /// What forces \[N\] move \[m\]: `P f/c`, zero at pinned nodes.
+    pub fn respond(&mut self, factor: &SystemFactor, forces: &[Vec3], out: &mut [Vec3]) {
+        self.preconditioner.apply(factor, forces, out);
+        self.key.pins.iter().for_each(|&p| out[p as usize] = Vec3::zeros());
+        if self.step_damping != 1.0 {
+            let scale = 1.0 / self.step_damping;
+            out.iter_mut().for_each(|o| *o *= scale);
+        }
     }
 
     /// Sets the trial to `x + step/c`.

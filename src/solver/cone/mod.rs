@@ -8,7 +8,18 @@ mod hessian;
 
 mod newton;
 
-pub(crate) use newton::ConeSolver;
-pub(crate) use problem::{ConeProblem, ConeTolerance, ConeWork};
+mod metric;
+
+mod coarse_newton;
+
+mod projected_gradient;
+
+pub(crate) use metric::{ConeMetric, MetricContact, MetricSide, Modes, STILL};
+pub(crate) use projected_gradient::{ConeOperator, GradientWork, ProjectedGradient};
+
+pub(crate) use newton::{ConeSolver, Newton};
+#[cfg(test)]
+pub(in crate::solver) use problem::ConeWork;
+pub(crate) use problem::{ConeProblem, ConeTolerance};
 #[cfg(test)]
 pub(in crate::solver) use {problem::spatial, projection::project};

@@ -30,7 +30,29 @@ const STAGE_TOLERANCE: f64 = 3.0e-3;
 /// Newton steps on a stage of the continuation.
 const STAGE_STEPS: usize = 40;
 /// Stages tried when warm start and short continuation failed.
+
+/// Stages tried when warm start and short continuation failed.
 const FINE_STAGES: [f64; 7] = [1.0, 0.1, 1e-2, 3e-3, 1e-3, 3e-4, EPSILON];
+
+/// How a solve goes about it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Newton {
+    /// From the forces as they are first.
+    pub begins_warm: bool,
+    /// By continuation, if that fails or is not tried.
+    pub continues: bool,
+    /// What a failure has come to is kept: forces that their laws admit, but not accurate.
+    pub keeps_failures: bool,
+    /// Factorizations at the most, about.
+    pub limit: usize,
+}
+
+impl Newton {
+    pub const FULL: Self =
+        Self { begins_warm: true, continues: true, keeps_failures: true, limit: usize::MAX };
+    pub const WARM: Self = Self { continues: false, keeps_failures: false, ..Self::FULL };
+    pub const NEAR: Self = Self { begins_warm: false, keeps_failures: false, ..Self::FULL };
+}
 
 /// Solves cone problems; holds the memory for them.
 #[derive(Default)]
@@ -77,13 +99,14 @@ impl ConeSolver {
     }
 
     /// Improves `lambda` \[N\], which holds the proximal centre and the start, to the solution.
-    /// `W_lambda` holds the product of the two and is kept so.
+    /// `W_lambda` holds the product of the two and is kept so. Where it fails both may stay as they are.
     pub fn solve(
         &mut self,
         problem: &ConeProblem,
         lambda: &mut [f64],
         W_lambda: &mut Vec<f64>,
         tolerance: ConeTolerance,
+        newton: Newton,
     ) -> ConeWork {
         let mut work = ConeWork::default();
         if problem.contacts() == 0 {
@@ -100,6 +123,7 @@ impl ConeSolver {
             solver.center.extend_from_slice(lambda);
             solver.Wz.clone_from(W_lambda);
             stages.iter().all(|&(epsilon, steps)| {
+                let steps = steps.min(newton.limit.saturating_sub(work.factorizations));
                 // What is only a start for the next stage need not be more exact than that.
                 let relative = if epsilon > EPSILON { STAGE_TOLERANCE } else { tolerance.relative };
                 let tolerance = ConeTolerance { relative: relative.max(tolerance.relative), ..tolerance };
@@ -109,17 +133,21 @@ impl ConeSolver {
                 done
             })
         };
-        let done = continuation(self, &[(EPSILON, WARM_STEPS)])
-            || continuation(self, &[(3e-2, STAGE_STEPS), (1e-3, STAGE_STEPS), (EPSILON, STAGE_STEPS)])
-            || continuation(self, &FINE_STAGES.map(|e| (e, STAGE_STEPS)));
+        let done = newton.begins_warm && continuation(self, &[(EPSILON, WARM_STEPS)])
+            || newton.continues
+                && (continuation(self, &[(3e-2, STAGE_STEPS), (1e-3, STAGE_STEPS), (EPSILON, STAGE_STEPS)])
+                    || continuation(self, &FINE_STAGES.map(|e| (e, STAGE_STEPS))));
         if !done {
             work.failures += 1;
+            if !newton.keeps_failures || self.gamma.iter().any(|g| !g.is_finite()) {
+                return work;
+            }
         }
         if done && self.is_feasible(problem) {
             // As good, and its product is there.
             lambda.copy_from_slice(&self.z);
             W_lambda.clone_from(&self.Wz);
-        } else if self.gamma.iter().all(|g| g.is_finite()) {
+        } else {
             lambda.copy_from_slice(&self.gamma);
             problem.multiply(lambda, W_lambda);
         }
@@ -173,7 +201,7 @@ impl ConeSolver {
         for step in 0..=STAGE_STEPS {
             let error = self.error(&z, tolerance);
             done = error <= tolerance.relative;
-            let hopeless = steps == WARM_STEPS && step == 0 && error > TOO_FAR;
+            let hopeless = steps <= WARM_STEPS && step == 0 && error > TOO_FAR;
             if done || hopeless || step >= steps && error > NEARLY || !error.is_finite() {
                 break;
             }

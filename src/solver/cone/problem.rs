@@ -59,6 +59,7 @@ pub(super) fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, larger)
 }
 
+#[inline(always)]
 pub(in crate::solver) fn spatial(rows: &[f64]) -> [f64; 3] {
     match rows {
         [n, t1, t2] => [*n, *t1, *t2],
@@ -67,6 +68,7 @@ pub(in crate::solver) fn spatial(rows: &[f64]) -> [f64; 3] {
     }
 }
 
+#[inline(always)]
 pub(super) fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -26,6 +26,7 @@ pub(crate) struct Projected {
 }
 
 /// Nearest force to `u` that the law allows. Of `u` only the first component counts without friction.
+#[inline(always)]
 pub(crate) fn project(u: [f64; 3], law: Law) -> Projected {
     let mu = match law {
         Law::Contact { friction } => friction,
@@ -52,6 +53,7 @@ pub(crate) fn project(u: [f64; 3], law: Law) -> Projected {
 
 /// Columns of `L` with `L Lᵀ = (1/R)·∂force/∂u` at `u`: the curvature of the contact, in `1/R`.
 /// Returns their number: none if open, one without friction, two if slipping, three if sticking.
+#[inline(always)]
 pub(crate) fn curvature_columns(u: [f64; 3], law: Law, R: f64, columns: &mut [[f64; 3]; 3]) -> usize {
     let projected = project(u, law);
     let mu = match law {

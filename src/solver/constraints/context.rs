@@ -22,4 +22,6 @@ pub(crate) struct ContactLimits {
     pub restitution_threshold: f64,
     /// Relative accuracy of the forces.
     pub tolerance: f64,
+    /// Products with W of crowds, per island and step.
+    pub products: usize,
 }

@@ -1,6 +1,7 @@
 //! Contacts in groups between the same two things, ordered so that the factor of their matrix fills in
 //! little.
 
+use super::elimination::Elimination;
 use super::rigid_proxy::RigidProxies;
 use crate::contact::{Constraint, Endpoint};
 
@@ -18,31 +19,16 @@ pub(crate) struct ContactGroups {
     known: Vec<([Option<u64>; 2], usize)>,
     group_of_constraint: Vec<usize>,
     sizes: Vec<usize>,
-    /// Adjacency during elimination, row by row.
-    adjacent: Vec<bool>,
-    eliminated: Vec<bool>,
-    /// Contacts of each group and of those adjacent to it, as far as they are not eliminated.
-    degrees: Vec<usize>,
-    /// Groups adjacent to the one that is eliminated.
-    near: Vec<usize>,
-    rank: Vec<usize>,
-    /// The group at each rank.
-    order: Vec<usize>,
-    /// Ends and sizes of the groups that the order was made for: the same ones, the same order.
-    ordered: (Vec<[Option<u64>; 2]>, Vec<usize>),
+    elimination: Elimination,
 }
 
 impl ContactGroups {
     /// Puts the constraints into groups, and the groups into an order of least degree.
     pub fn arrange(&mut self, constraints: &mut [Constraint], proxies: &RigidProxies) {
         self.find(constraints, proxies);
-        if self.ordered.0 != self.ends || self.ordered.1 != self.sizes {
-            self.find_adjacent();
-            self.eliminate();
-            self.ordered.0.clone_from(&self.ends);
-            self.ordered.1.clone_from(&self.sizes);
-        }
-        let (group_of_constraint, rank) = (&self.group_of_constraint, &self.rank);
+        self.find_adjacent();
+        self.elimination.arrange(&self.sizes);
+        let (group_of_constraint, rank) = (&self.group_of_constraint, &self.elimination.rank);
         let sorted = group_of_constraint.windows(2).all(|w| rank[w[0]] <= rank[w[1]]);
         if !sorted {
             let known = &self.known;
@@ -56,7 +42,7 @@ impl ContactGroups {
         self.starts.clear();
         self.starts.push(0);
         for place in 0..groups {
-            self.starts.push(self.starts[place] + self.sizes[self.order[place]]);
+            self.starts.push(self.starts[place] + self.sizes[self.elimination.order[place]]);
         }
         self.fill();
     }
@@ -84,66 +70,39 @@ impl ContactGroups {
     }
 
     fn find_adjacent(&mut self) {
-        let groups = self.ends.len();
-        self.adjacent.clear();
-        self.adjacent.resize(groups * groups, false);
-        for a in 0..groups {
-            for b in 0..groups {
-                let shared = self.ends[a].iter().flatten().any(|e| self.ends[b].contains(&Some(*e)));
-                self.adjacent[a * groups + b] = shared || a == b;
+        self.elimination.begin(self.ends.len());
+        for a in 0..self.ends.len() {
+            for b in 0..a {
+                if self.share(a, b) {
+                    self.elimination.connect(a, b);
+                }
             }
         }
     }
 
-    /// Least degree first, counted in contacts; ties by index.
-    fn eliminate(&mut self) {
-        let Self { sizes, adjacent, eliminated, degrees, near, rank, order, .. } = self;
-        let groups = sizes.len();
-        eliminated.clear();
-        eliminated.resize(groups, false);
-        degrees.clear();
-        for row in adjacent.chunks(groups.max(1)) {
-            degrees.push(row.iter().zip(&*sizes).filter(|(a, _)| **a).map(|(_, size)| size).sum());
-        }
-        rank.clear();
-        rank.resize(groups, 0);
-        order.clear();
-        for place in 0..groups {
-            let open = (0..groups).filter(|&g| !eliminated[g]);
-            let Some(next) = open.min_by_key(|&g| (degrees[g], g)) else { break };
-            rank[next] = place;
-            order.push(next);
-            eliminated[next] = true;
-            near.clear();
-            near.extend((0..groups).filter(|&g| adjacent[next * groups + g] && !eliminated[g]));
-            for &a in &*near {
-                degrees[a] -= sizes[next];
-                for &b in &*near {
-                    if !std::mem::replace(&mut adjacent[a * groups + b], true) {
-                        degrees[a] += sizes[b];
-                    }
-                }
-            }
-        }
+    fn share(&self, a: usize, b: usize) -> bool {
+        self.ends[a].iter().flatten().any(|end| self.ends[b].contains(&Some(*end)))
     }
 
     /// Lists the pairs in the new order.
     fn fill(&mut self) {
-        let groups = self.sizes.len();
-        self.coupled.clear();
-        self.filled.clear();
-        for j in 0..groups {
-            for i in j..groups {
-                let (a, b) = (self.order[i], self.order[j]);
-                let shared = self.ends[a].iter().flatten().any(|e| self.ends[b].contains(&Some(*e)));
-                if shared || i == j {
-                    self.coupled.push((i, j));
-                }
-                if self.adjacent[a * groups + b] {
-                    self.filled.push((i, j));
-                }
-            }
-        }
+        self.elimination.list_filled(&mut self.filled);
+        let mut coupled = std::mem::take(&mut self.coupled);
+        let order = &self.elimination.order;
+        coupled.clear();
+        coupled.extend(self.filled.iter().filter(|&&(i, j)| i == j || self.share(order[i], order[j])));
+        self.coupled = coupled;
+    }
+
+    /// Multiplications and additions of one factorization, about, with three rows a contact.
+    pub fn factor_work(&self) -> usize {
+        let rows = |place: usize| 3 * self.sizes[self.elimination.order[place]];
+        let column_work = |column: &[(usize, usize)]| {
+            let own = rows(column[0].1);
+            let below: usize = column[1..].iter().map(|(i, _)| rows(*i)).sum();
+            own * own * own / 3 + own * below * (own + below)
+        };
+        self.filled.chunk_by(|a, b| a.1 == b.1).map(column_work).sum()
     }
 }
 

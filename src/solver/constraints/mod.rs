@@ -4,12 +4,25 @@ mod rigid_proxy;
 
 mod context;
 
+mod elimination;
+
 mod groups;
 
 mod delassus;
 
+mod matrix_free;
+
+mod coarse_space;
+
+mod gaps;
+
 mod system;
+
+mod improve;
+
+#[cfg(test)]
+mod tests;
 
 pub(crate) use context::{ContactLimits, SolveContext};
 pub(crate) use rigid_proxy::{Articulation, Reaction, RigidProxies, RigidProxy, Twist};
-pub(crate) use system::ContactSystem;
+pub(crate) use system::{Change, ContactSystem, ContactWork};

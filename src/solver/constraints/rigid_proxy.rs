@@ -140,26 +140,44 @@ impl RigidProxies {
         let proxy = self.get(id);
         match proxy {
             RigidProxy::Prescribed { start, end } => prescribed(endpoint, start, end),
-            RigidProxy::Rigid { inv_mass, inv_inertia, free, .. } => {
-                let reaction = &reactions[id.0 as usize];
-                let twist = Twist {
-                    linear: free.linear + inv_mass.component_mul(&reaction.impulse),
-                    angular: free.angular + inv_inertia * reaction.torque_impulse,
-                };
+            RigidProxy::Rigid { free, .. } | RigidProxy::Link { free, .. } => {
+                let gained = self.gained(proxy, id, reactions);
+                let twist =
+                    Twist { linear: free.linear + gained.linear, angular: free.angular + gained.angular };
                 proxy.at(endpoint, &twist) * h
             }
-            RigidProxy::Link { articulation, slot, free, .. } => {
+        }
+    }
+
+    /// As [`Self::displacement`], of what the reactions add alone.
+    pub fn response(&self, endpoint: &Endpoint, reactions: &[Reaction], h: f64) -> Vec3 {
+        let Some(id) = endpoint.proxy() else { return Vec3::zeros() };
+        let proxy = self.get(id);
+        proxy.at(endpoint, &self.gained(proxy, id, reactions)) * h
+    }
+
+    /// Velocity that reactions give to a proxy.
+    fn gained(&self, proxy: &RigidProxy, id: ProxyId, reactions: &[Reaction]) -> Twist {
+        match proxy {
+            RigidProxy::Prescribed { .. } => Twist::default(),
+            RigidProxy::Rigid { inv_mass, inv_inertia, .. } => {
+                let reaction = &reactions[id.0 as usize];
+                Twist {
+                    linear: inv_mass.component_mul(&reaction.impulse),
+                    angular: inv_inertia * reaction.torque_impulse,
+                }
+            }
+            RigidProxy::Link { articulation, slot, .. } => {
                 let Articulation { links, blocks } = &self.articulations[*articulation];
                 let mut sum = Vector6::zeros();
                 for (link, block) in links.iter().zip(&blocks[slot * links.len()..]) {
                     let reaction = &reactions[link.0 as usize];
                     sum += block * stacked(&[reaction.impulse, reaction.torque_impulse]);
                 }
-                let twist = Twist {
-                    linear: free.linear + sum.fixed_rows::<3>(0),
-                    angular: free.angular + sum.fixed_rows::<3>(3),
-                };
-                proxy.at(endpoint, &twist) * h
+                Twist {
+                    linear: sum.fixed_rows::<3>(0).into_owned(),
+                    angular: sum.fixed_rows::<3>(3).into_owned(),
+                }
             }
         }
     }

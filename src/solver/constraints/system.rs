@@ -4,15 +4,18 @@
 //! anew in every iteration. Detection finds whatever might touch within the step; the problem holds what
 //! carried in the last one or is about to close, and activates what is found to close when it does.
 
+use super::coarse_space::CoarseSpace;
 use super::context::SolveContext;
-use super::delassus::{ContactRows, Delassus, steady_geometry};
+use super::delassus::{Delassus, steady_geometry};
+use super::gaps::{end, relative_motion, target_gap};
 use super::groups::ContactGroups;
+use super::matrix_free::Response;
 use super::rigid_proxy::{Reaction, RigidProxies};
 use crate::body::{ConstraintGeometry, ConstraintMemory};
 use crate::contact::{Constraint, Endpoint, Law};
 use crate::math::Vec3;
-use crate::solver::body_step::{BodyProblem, Factors};
-use crate::solver::cone::{ConeProblem, ConeSolver, ConeTolerance, ConeWork};
+use crate::solver::body_step::BodyProblem;
+use crate::solver::cone::{ConeMetric, ConeProblem, ConeSolver, ProjectedGradient};
 
 /// Contacts of the bodies of one island.
 #[derive(Default)]
@@ -22,28 +25,91 @@ pub(crate) struct ContactSystem {
     active: usize,
     /// Ends of the gaps of the others \[m\].
     open: Vec<f64>,
-    problem: ConeProblem,
-    groups: ContactGroups,
-    solver: ConeSolver,
     /// Forces \[N\], packed as the problem is.
     pub lambda: Vec<f64>,
     /// De Saxcé shift of each contact \[m\].
     pub shift: Vec<f64>,
-    g_free: Vec<f64>,
-    /// W λ.
-    slips: Vec<f64>,
-    before: Vec<f64>,
+    /// Motions along the contacts' directions under the present forces, and what they leave of the gaps above their
+    /// targets \[m\].
+    pub(super) motions: Vec<f64>,
+    pub(super) gaps: Vec<f64>,
+    pub(super) before: Vec<f64>,
+    pub(super) shift_before: Vec<f64>,
     reactions: Vec<Reaction>,
     /// Where each contact acts, for W.
-    geometry: Vec<ConstraintGeometry>,
-    delassus: Delassus,
+    pub(super) geometry: Vec<ConstraintGeometry>,
+    pub(super) groups: ContactGroups,
+    pub(super) dense: DenseSolve,
+    pub(super) free: FreeSolve,
+    pub work: ContactWork,
+    pub(super) spent: Spent,
+}
+
+/// What was spent of the step's budget.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Spent {
+    /// Products, and factorizations of crowds in their place.
+    pub products: f64,
+    /// Of factorizations of small islands.
+    pub operations: usize,
+}
+
+/// Newton's method with the Delassus operator as a matrix.
+#[derive(Default)]
+pub(super) struct DenseSolve {
+    pub problem: ConeProblem,
+    pub delassus: Delassus,
+    pub solver: ConeSolver,
+    /// W λ, if it is current.
+    pub slips: Vec<f64>,
+    pub change: Change,
+    pub g_free: Vec<f64>,
+    /// Its last try from the forces of the step before has failed.
+    pub has_failed: bool,
+}
+
+/// Projected gradients, which only multiply with it.
+#[derive(Default)]
+pub(super) struct FreeSolve {
+    pub response: Response,
+    pub coarse: CoarseSpace,
+    pub metric: ConeMetric,
+    pub method: ProjectedGradient,
+    pub r: Vec<f64>,
+    pub change: Change,
+}
+
+/// What has changed since W or its metric were made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Change {
+    #[default]
+    Nothing,
+    /// The forces, by others.
+    Forces,
+    /// Frames of bodies.
+    Frames,
+    /// Factors or dampings.
+    Factors,
+    /// The contacts themselves.
+    Contacts,
+}
+
+/// What the contact solves of a step took, and left.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct ContactWork {
+    pub newton_steps: usize,
+    pub factorizations: usize,
+    /// Solves that Newton's method did not finish.
+    pub failures: usize,
+    pub products: usize,
+    /// The budget is gone.
+    pub is_exhausted: bool,
+    /// Of the last solve, relative to the largest force.
+    pub error: f64,
 }
 
 /// Compliance [m/N] of contacts of a body that keeps its shape with itself: any positive number.
 const WITHIN_A_SHAPE: f64 = 1.0e-6;
-/// Solves with a fresh shift per contact problem, of which an iteration has up to four.
-const SHIFT_ROUNDS: usize = 2;
-
 impl ContactSystem {
     pub fn is_empty(&self) -> bool {
         self.constraints.is_empty()
@@ -61,6 +127,10 @@ impl ContactSystem {
             constraint.target_gap = target_gap(constraint, bodies, context);
         }
         self.open.clear();
+        self.work = ContactWork::default();
+        self.renew_budget();
+        self.dense.has_failed = false;
+        self.free.method.begin();
         let carries =
             |constraint: &Constraint| constraint.warm_force != Vec3::zeros() || constraint.key.is_shared();
         self.constraints.sort_unstable_by_key(|constraint| !carries(constraint));
@@ -69,12 +139,24 @@ impl ContactSystem {
         self.scatter_contact_forces(bodies);
     }
 
+    /// What follows may take as much as a step.
+    pub fn renew_budget(&mut self) {
+        self.spent = Spent::default();
+    }
+
+    /// Takes note of what has changed.
+    pub fn outdate(&mut self, change: Change) {
+        self.dense.change = self.dense.change.max(change);
+        self.free.change = self.free.change.max(change);
+    }
+
     fn pack(&mut self, context: &SolveContext<'_>) {
+        self.outdate(Change::Contacts);
         let constraints = &mut self.constraints[..self.active];
         self.groups.arrange(constraints, context.proxies);
-        self.problem.offsets.clear();
-        self.problem.offsets.push(0);
-        self.problem.laws.clear();
+        self.dense.problem.offsets.clear();
+        self.dense.problem.offsets.push(0);
+        self.dense.problem.laws.clear();
         self.lambda.clear();
         self.shift.clear();
         self.geometry.clear();
@@ -82,8 +164,8 @@ impl ContactSystem {
             self.geometry.push(steady_geometry(constraint, context.proxies));
             self.lambda.extend(constraint.directions().iter().map(|d| d.dot(&constraint.warm_force)));
             self.shift.push(constraint.warm_shift_rate * context.h);
-            self.problem.offsets.push(self.lambda.len());
-            self.problem.laws.push(constraint.law);
+            self.dense.problem.offsets.push(self.lambda.len());
+            self.dense.problem.laws.push(constraint.law);
         }
     }
 
@@ -127,7 +209,7 @@ impl ContactSystem {
         true
     }
 
-    fn collect_reactions(&mut self, context: &SolveContext<'_>) -> Vec<Reaction> {
+    pub(super) fn collect_reactions(&mut self, context: &SolveContext<'_>) -> Vec<Reaction> {
         let mut reactions = std::mem::take(&mut self.reactions);
         reactions.clear();
         reactions.resize(context.proxies.list.len(), Reaction::default());
@@ -135,94 +217,9 @@ impl ContactSystem {
         reactions
     }
 
-    /// Assembles W for the current frames and scalings of the bodies, unless the last one was made of
-    /// the same bits: so it is at rest.
-    pub fn assemble(&mut self, bodies: &[BodyProblem], factors: Factors<'_>, context: &SolveContext<'_>) {
-        let constraints = ContactRows {
-            constraints: &self.constraints[..self.active],
-            geometry: &self.geometry,
-            offsets: &self.problem.offsets,
-            groups: &self.groups,
-        };
-        if self.delassus.update(
-            &mut self.problem.W,
-            &constraints,
-            bodies,
-            factors,
-            context.proxies,
-            context.h,
-        ) {
-            self.problem.groups.clone_from(&self.groups.starts);
-            self.problem.filled.clone_from(&self.groups.filled);
-            self.problem.version += 1;
-        }
-        self.problem.multiply(&self.lambda, &mut self.slips);
-    }
-
-    /// Lets the solve begin where the last step's forces and slips were, and where the bodies' trial positions are.
-    pub fn predict(&mut self, bodies: &[BodyProblem], context: &SolveContext<'_>) {
-        let reactions = self.collect_reactions(context);
-        let end = |i: usize| end(&self.constraints[i], bodies, context, &reactions);
-        self.solver.predict(&self.problem, &self.lambda, &self.shift, end);
+    /// The memory of [`Self::collect_reactions`].
+    pub(super) fn give_back(&mut self, reactions: Vec<Reaction>) {
         self.reactions = reactions;
-    }
-
-    /// Takes the gaps at the bodies' trial positions, to which the present forces have brought them,
-    /// and improves the forces; tells what that took, and whether they have changed. What has to be
-    /// applied to the bodies is the change, in their `contact_change`.
-    pub fn solve(
-        &mut self,
-        bodies: &mut [BodyProblem],
-        context: &SolveContext<'_>,
-        tolerance: ConeTolerance,
-    ) -> (ConeWork, bool) {
-        let reactions = self.collect_reactions(context);
-        self.g_free.clear();
-        for constraint in &self.constraints[..self.active] {
-            let at_trial = |body: usize| &bodies[body].trial.x[..];
-            let moved = relative_motion(constraint, bodies, at_trial, context, &reactions);
-            let of_forces = &self.slips[self.g_free.len()..];
-            let motions = constraint.directions().iter().map(|d| d.dot(&moved)).zip(of_forces);
-            let first = self.g_free.len();
-            self.g_free.extend(motions.map(|(motion, by_forces)| motion - by_forces));
-            // What the constraint itself gives way by is no motion of its ends.
-            self.g_free[first] += constraint.target_gap + constraint.compliance * self.lambda[first];
-        }
-        self.reactions = reactions;
-        self.before.clone_from(&self.lambda);
-        let mut work = ConeWork::default();
-        let slides = self.constraints[..self.active].iter().any(|constraint| constraint.dimension() == 3);
-        for _ in 0..if slides { SHIFT_ROUNDS } else { 1 } {
-            self.problem.g.clone_from(&self.g_free);
-            for (i, shift) in self.shift.iter().enumerate() {
-                self.problem.g[self.problem.offsets[i]] += shift;
-            }
-            let done = self.solver.solve(&self.problem, &mut self.lambda, &mut self.slips, tolerance);
-            work.newton_steps += done.newton_steps;
-            work.factorizations += done.factorizations;
-            work.failures += done.failures;
-            self.update_shifts();
-        }
-        let changed = self.before != self.lambda;
-        if changed {
-            self.scatter_changes(bodies);
-        }
-        (work, changed)
-    }
-
-    /// σ = μ‖slip‖ of contacts that carry, 0 of open ones.
-    fn update_shifts(&mut self) {
-        for i in 0..self.active {
-            let first = self.problem.offsets[i];
-            self.shift[i] = 0.0;
-            if let Law::Contact { friction } = self.constraints[i].law
-                && friction > 0.0
-                && self.lambda[first] > 0.0
-            {
-                let slip = |k: usize| self.g_free[first + k] + self.slips[first + k];
-                self.shift[i] = friction * slip(1).hypot(slip(2));
-            }
-        }
     }
 
     /// What the contacts of a body have put into all that they touch \[J\]: work on both of their sides, with the bodies
@@ -259,7 +256,7 @@ impl ContactSystem {
                 }
             }
             if i < self.active && (is_own || constraint.endpoints.iter().all(is_rigid)) {
-                self.lambda[self.problem.offsets[i]..self.problem.offsets[i + 1]].fill(0.0);
+                self.lambda[self.dense.problem.offsets[i]..self.dense.problem.offsets[i + 1]].fill(0.0);
                 self.shift[i] = 0.0;
             }
         }
@@ -300,7 +297,8 @@ impl ContactSystem {
         if i >= self.active {
             return Vec3::zeros();
         }
-        self.constraints[i].force(&self.lambda[self.problem.offsets[i]..self.problem.offsets[i + 1]])
+        self.constraints[i]
+            .force(&self.lambda[self.dense.problem.offsets[i]..self.dense.problem.offsets[i + 1]])
     }
 
     /// What contact `i` of the problem leaves to the next step.
@@ -313,10 +311,7 @@ impl ContactSystem {
     pub fn final_gap(&self, i: usize) -> f64 {
         let above_target = match i.checked_sub(self.active) {
             Some(place) => self.open[place],
-            None => {
-                let normal = self.problem.offsets[i];
-                self.g_free[normal] + self.slips[normal]
-            }
+            None => self.gaps[self.dense.problem.offsets[i]],
         };
         above_target - self.constraints[i].target_gap + self.constraints[i].gap
     }
@@ -333,58 +328,4 @@ impl ContactSystem {
             }
         }
     }
-}
-
-/// What to add to the motion along the normal so that zero is the target_gap.
-fn target_gap(constraint: &Constraint, bodies: &[BodyProblem], context: &SolveContext<'_>) -> f64 {
-    let (h, limits) = (context.h, context.limits);
-    if let Law::Bilateral { .. } = constraint.law {
-        // What gives way is pulled back by its own force.
-        let fastest = if constraint.compliance > 0.0 { f64::INFINITY } else { limits.recovery_speed * h };
-        return constraint.gap.clamp(-fastest, fastest);
-    }
-    let velocity = |endpoint: &Endpoint| match endpoint {
-        Endpoint::Soft { body, .. } => endpoint.interpolate(&bodies[*body].v_start),
-        _ => context.proxies.velocity(endpoint, context.h),
-    };
-    let approach =
-        -constraint.frame[0].dot(&(velocity(&constraint.endpoints[0]) - velocity(&constraint.endpoints[1])));
-    let hits = constraint.gap < approach * h;
-    let is_new = constraint.warm_force == Vec3::zeros();
-    if is_new && hits && constraint.restitution > 0.0 && approach > limits.restitution_threshold {
-        // Leaves with e times the speed it came with, from where it is.
-        return -constraint.restitution * approach * h;
-    }
-    constraint.gap.max(-limits.recovery_speed * h)
-}
-
-/// What is left of the gap, above its target_gap, at the bodies' trial positions \[m\].
-fn end(
-    constraint: &Constraint,
-    bodies: &[BodyProblem],
-    context: &SolveContext<'_>,
-    reactions: &[Reaction],
-) -> f64 {
-    let at_trial = |body: usize| &bodies[body].trial.x[..];
-    constraint.target_gap
-        + constraint.frame[0].dot(&relative_motion(constraint, bodies, at_trial, context, reactions))
-}
-
-/// How far endpoint 0 has moved against endpoint 1 since the start of the step \[m\]: bodies to where they are `at`,
-/// proxies under these reactions.
-fn relative_motion<'a>(
-    constraint: &Constraint,
-    bodies: &[BodyProblem],
-    at: impl Fn(usize) -> &'a [Vec3],
-    context: &SolveContext<'_>,
-    reactions: &[Reaction],
-) -> Vec3 {
-    let moved = |endpoint: &Endpoint| match endpoint {
-        Endpoint::Soft { body, .. } => {
-            let (x, start) = (at(*body), &bodies[*body].x_start);
-            endpoint.soft_nodes().fold(Vec3::zeros(), |sum, (n, w)| sum + (x[n] - start[n]) * w)
-        }
-        _ => context.proxies.displacement(endpoint, reactions, context.h),
-    };
-    moved(&constraint.endpoints[0]) - moved(&constraint.endpoints[1])
 }

@@ -98,7 +98,12 @@ impl ComplianceColumns {
     }
 
     pub fn bytes(&self) -> usize {
-        self.made * self.columns.len() * self.d * self.d * size_of::<f64>()
+        self.bytes_of(self.made)
+    }
+
+    /// Bytes of the columns of so many nodes.
+    pub fn bytes_of(&self, nodes: usize) -> usize {
+        nodes * self.columns.len() * self.d * self.d * size_of::<f64>()
     }
 
     pub fn clear(&mut self) {

@@ -3,6 +3,7 @@
 //! Everything is keyed by the exact bits it was made from, so a fresh cache gives the same bits as
 //! an old one; it only takes longer.
 
+use super::affine_modes::CoarseInverse;
 use super::clusters::Clusters;
 use super::coefficients::{dimension, stiffening};
 use super::compliance_columns::ComplianceColumns;
@@ -24,6 +25,7 @@ pub(crate) struct SystemFactor {
     pub system: SystemMatrix,
     pub columns: ComplianceColumns,
     pub clusters: Option<Clusters>,
+    pub coarse: CoarseInverse,
     /// Different for every factor that a cache, or an island, has made.
     pub serial: u64,
 }
@@ -49,6 +51,10 @@ pub(crate) struct FactorCache {
     places: HashMap<FactorKey, usize>,
     scratch: FactorScratch,
     ages: Vec<u64>,
+    /// \[bytes\]; and what the bodies of this step have asked for so far.
+    column_budget: usize,
+    columns_wanted: usize,
+    nodes: Vec<u32>,
     step: u64,
     made: u64,
 }
@@ -59,7 +65,17 @@ pub(crate) struct CacheWork {
     pub id: FactorId,
     pub factorizations: usize,
     pub columns: usize,
+    /// All columns that were asked for are there.
+    pub has_columns: bool,
 }
+
+/// Operations that columns may take which a body's contacts want at once: 100 to 200 ms. Beyond, contacts make do with products:
+/// so do 98 nodes of a cube of 3645 tets at twice the number, and 225 nodes of one of 13720 at none below 5e9.
+const COLUMN_WORK: usize = 1_000_000_000;
+/// Nodes that a body has to be able to pay for to be prepared for contacts.
+const FEW_NODES: usize = 64;
+/// Operations of an iterative solve per node, over those of a number of a factor.
+const ITERATIVE: usize = 3000;
 
 /// Steps after which an unused factor is dropped: two seconds at game speed.
 const UNUSED_STEPS: u64 = 120;
@@ -71,6 +87,8 @@ impl FactorCache {
     /// columns beyond the budget \[bytes\].
     pub fn begin_step(&mut self, column_budget: usize) {
         self.step += 1;
+        self.column_budget = column_budget;
+        self.columns_wanted = 0;
         let oldest = self.step.saturating_sub(UNUSED_STEPS);
         self.forget_before(oldest);
         // A material or a step that changes all the time must not fill the memory with old factors.
@@ -120,8 +138,31 @@ impl FactorCache {
         work.id = FactorId(*self.places.get(key)?);
         let entry = &mut self.factors[work.id.0];
         entry.last_used = self.step;
+        self.nodes.clear();
+        self.nodes.extend(surface_nodes);
+        self.nodes.sort_unstable();
+        self.nodes.dedup();
         let Entry { made: SystemFactor { symbolic, factor, columns, .. }, model, .. } = entry;
-        work.columns = columns.prepare(model, &key.pins, symbolic, factor, surface_nodes, &mut self.scratch);
+        // Decided by what is asked for, not by what is there: a fresh cache comes to the same bits.
+        self.columns_wanted += columns.bytes_of(self.nodes.len());
+        work.has_columns = columns_pay(symbolic, factor, model, self.nodes.len())
+            && self.columns_wanted <= self.column_budget;
+        if work.has_columns {
+            let nodes = self.nodes.iter().copied();
+            work.columns = columns.prepare(model, &key.pins, symbolic, factor, nodes, &mut self.scratch);
+        }
+        Some(work)
+    }
+
+    /// Makes a body's factor, and the columns of all of its surface if few contacts pay for theirs; as [`Self::prepare`].
+    pub fn prepare_surface(&mut self, key: &FactorKey, body: &DeformableBody, h: f64) -> Option<CacheWork> {
+        let mut work = self.prepare(key, body, h, std::iter::empty())?;
+        let Entry { made: SystemFactor { symbolic, factor, columns, .. }, model, .. } =
+            &mut self.factors[work.id.0];
+        let all = 0..model.surface.nodes.len() as u32;
+        if columns_pay(symbolic, factor, model, FEW_NODES.min(all.len())) {
+            work.columns = columns.prepare(model, &key.pins, symbolic, factor, all, &mut self.scratch);
+        }
         Some(work)
     }
 
@@ -144,7 +185,7 @@ impl FactorCache {
     /// Makes and keeps the factor of a body.
     fn make(&mut self, key: &FactorKey, body: &DeformableBody, h: f64) -> Option<()> {
         let symbolic = self.pattern(key, body)?;
-        let factor = self.factor_of(key, body, h, &symbolic)?;
+        let (factor, coarse) = self.factor_of(key, body, h, &symbolic)?;
         let columns = ComplianceColumns::new(&body.model.surface, key.system);
         let clusters = (key.clusters > 0).then(|| {
             let weight = laplacian_weight(&body.material) * stiffening(&body.material, h);
@@ -153,7 +194,7 @@ impl FactorCache {
         });
         let serial = self.made;
         let made = Entry {
-            made: SystemFactor { symbolic, factor, system: key.system, columns, clusters, serial },
+            made: SystemFactor { symbolic, factor, system: key.system, columns, clusters, coarse, serial },
             key: key.clone(),
             model: body.model.clone(),
             last_used: self.step,
@@ -164,34 +205,37 @@ impl FactorCache {
         Some(())
     }
 
-    /// The numbers of a factor, or what the body's solver has in its place.
+    /// The numbers of a factor, or what the body's solver has in its place, and what they are near.
     fn factor_of(
         &mut self,
         key: &FactorKey,
         body: &DeformableBody,
         h: f64,
         symbolic: &Symbolic,
-    ) -> Option<Factor> {
-        let assembled = || system::assemble(&body.model, &body.material, &key.pins, key.system, h, symbolic);
-        Some(match key.solver {
-            Solver::Projective => {
-                let values = assembled();
+    ) -> Option<(Factor, CoarseInverse)> {
+        if key.solver == Solver::ConjugateGradients {
+            let operator = StiffnessOperator::new(&body.model, &body.material, &key.pins, key.system, h);
+            let coarse = CoarseInverse { local: operator.local_compliance(), modes: None };
+            return Some((Factor::Iterative(Box::new(operator)), coarse));
+        }
+        let values = system::assemble(&body.model, &body.material, &key.pins, key.system, h, symbolic);
+        let mut coarse = CoarseInverse::new(&body.model, &key.pins, symbolic, &values);
+        let factor = match key.solver {
+            Solver::Projective | Solver::ConjugateGradients => {
                 let factor = symbolic.factorize(&values, &mut self.scratch).ok()?;
                 let is_pinned = !key.pins.is_empty();
                 let is_single = system::in_single_precision(body, is_pinned, h, symbolic, &values);
                 if is_single { factor.rounded() } else { factor }
             }
-            Solver::ConjugateGradients => {
-                let (model, material) = (&body.model, &body.material);
-                let operator = StiffnessOperator::new(model, material, &key.pins, key.system, h);
-                Factor::Iterative(Box::new(operator))
-            }
-            Solver::GaussSeidel => Factor::GaussSeidel(assembled()),
+            Solver::GaussSeidel => Factor::GaussSeidel(values),
             // Newton's method makes its own, and falls back on this.
-            Solver::Jacobi | Solver::Newton => {
-                Factor::Jacobi(symbolic.upper(&assembled()).inverse_row_sums())
-            }
-        })
+            Solver::Jacobi | Solver::Newton => Factor::Jacobi(symbolic.upper(&values).inverse_row_sums()),
+        };
+        if factor.is_rough() {
+            // What stands in for the inverse falls short of it, of its affine part most of all.
+            coarse.modes = None;
+        }
+        Some((factor, coarse))
     }
 
     /// Makes the columns of the first of these surface nodes that have none: one batch of them, so that
@@ -199,6 +243,9 @@ impl FactorCache {
     pub fn prepare_ahead(&mut self, id: FactorId, pins: &[u32], surface_nodes: &[u32]) -> usize {
         let Entry { made, model, .. } = &mut self.factors[id.0];
         let SystemFactor { symbolic, factor, columns, system, .. } = made;
+        if !columns_pay(symbolic, factor, model, FEW_NODES) {
+            return 0;
+        }
         let missing = surface_nodes.iter().copied().filter(|s| !columns.has(*s));
         let batch: Vec<u32> = missing.take(BATCH / dimension(*system)).collect();
         columns.prepare(model, pins, symbolic, factor, batch.into_iter(), &mut self.scratch)
@@ -219,4 +266,13 @@ impl FactorCache {
     pub fn column_bytes(&self) -> usize {
         self.factors.iter().map(|f| f.made.columns.bytes()).sum()
     }
+}
+
+/// Whether as many nodes are worth their columns.
+fn columns_pay(symbolic: &Symbolic, factor: &Factor, model: &DeformableModel, nodes: usize) -> bool {
+    let numbers = match factor {
+        Factor::Iterative(_) => ITERATIVE * model.rest.len(),
+        _ => symbolic.factor_len(),
+    };
+    3 * 4 * numbers * nodes <= COLUMN_WORK
 }

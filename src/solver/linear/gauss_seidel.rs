@@ -11,6 +11,9 @@ pub(crate) struct UpperTriangle<'a> {
     pub values: &'a [f64],
 }
 
+/// Diagonal of `A⁻¹` times that of A, about: 1.52 for the Laplacian of a cubic lattice.
+pub(super) const OVER_DIAGONAL: f64 = 1.5;
+
 impl<'a> UpperTriangle<'a> {
     /// Entries above the diagonal of column `j`, and the diagonal.
     fn column(&self, j: usize) -> (&'a [usize], &'a [f64], f64) {
@@ -36,6 +39,15 @@ impl<'a> UpperTriangle<'a> {
             }
         }
         sums.into_iter().map(|s| 1.0 / s).collect()
+    }
+
+    /// About how far a unit of force moves the node that it acts on, by what is elastic around it [m/N]: `d` unknowns a
+    /// node, zero where it is pinned.
+    pub fn local_compliance(&self, d: usize, pins: &[u32]) -> Vec<f64> {
+        let mean = |n: usize| (d * n..d * (n + 1)).map(|j| self.column(j).2).sum::<f64>() / d as f64;
+        let mut local: Vec<f64> = (0..self.len() / d).map(|n| OVER_DIAGONAL / mean(n)).collect();
+        pins.iter().for_each(|&p| local[p as usize] = 0.0);
+        local
     }
 
     /// `x ← (D + U)⁻¹ D (D + L)⁻¹ x`: a sweep forward and one back, from zero. Its inverse is

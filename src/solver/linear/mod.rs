@@ -15,6 +15,8 @@ mod block_matrix;
 
 mod system;
 
+mod affine_modes;
+
 mod clusters;
 mod compliance_columns;
 
@@ -24,6 +26,7 @@ mod rigid_mode;
 
 mod preconditioner;
 
+pub(crate) use affine_modes::{CoarseInverse, MODES};
 pub(crate) use block_matrix::{BlockFactor, BlockMatrix};
 pub(crate) use compliance_columns::ComplianceColumns;
 pub(crate) use factor::{FactorScratch, Symbolic};

@@ -2,6 +2,7 @@
 //! on bodies whose factor would not fit, or would be made anew all the time.
 
 use super::coefficients::{dimension, inertia, stiffening};
+use super::gauss_seidel::OVER_DIAGONAL;
 use crate::fem::constant_matrix::{add_blocks, subtract_product};
 use crate::fem::{DeformableModel, Elements, SystemMatrix};
 use crate::material::DeformableMaterial;
@@ -71,6 +72,14 @@ impl StiffnessOperator {
         };
         operator.inverse_diagonal = diagonal.iter().zip(&operator.inertia).map(invert).collect();
         operator
+    }
+
+    /// As that of a matrix that is put together.
+    pub fn local_compliance(&self) -> Vec<f64> {
+        let mean = |block: &Mat3| OVER_DIAGONAL * block.trace() / 3.0;
+        let mut local: Vec<f64> = self.inverse_diagonal.iter().map(mean).collect();
+        self.pins.iter().for_each(|&p| local[p as usize] = 0.0);
+        local
     }
 
     pub fn bytes(&self) -> usize {

@@ -226,8 +226,13 @@ impl Preconditioner {
         self.counters.linear_time += clock.lap();
     }
 
+    /// Whether the body moves as P without more than frames around the inverse: no rigid shape, no deflation.
+    pub fn is_framed(&self) -> bool {
+        self.kind != FrameKind::Rigid && !self.deflation.active
+    }
+
     /// The frame of a node.
-    fn frame(&self, node: usize) -> Mat3 {
+    pub fn frame(&self, node: usize) -> Mat3 {
         match self.kind {
             FrameKind::Isotropic | FrameKind::Rigid => Mat3::identity(),
             FrameKind::Floating => self.floating,

@@ -1,0 +1,101 @@
+//! Spectral projected gradients [Birgin et al. 2000] in a metric that holds the bodies' modes: the contact solve for what
+//! is large or just forming.
+//!
+//! W is only ever multiplied with. Every iterate is in its cones and none is worse than the one before, so the method can
+//! be stopped anywhere.
+
+use super::coarse_newton::{CoarseNewton, CoarseProblem};
+use super::metric::ConeMetric;
+use super::problem::ConeTolerance;
+
+/// Memory for solves.
+#[derive(Default)]
+pub(crate) struct ProjectedGradient {
+    coarse: CoarseNewton,
+    d: Vec<f64>,
+    Wd: Vec<f64>,
+    VVd: Vec<f64>,
+    /// Factor on 1/D, kept between the solves of a step.
+    alpha: f64,
+}
+
+/// What a solve took, and left.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct GradientWork {
+    pub products: usize,
+    /// As [`ConeMetric::error`].
+    pub error: f64,
+}
+
+/// What W does, and who wants to know how far the forces went along what was multiplied.
+pub(crate) trait ConeOperator {
+    /// `out = W v`.
+    fn multiply(&mut self, v: &[f64], out: &mut Vec<f64>);
+    /// The forces have gone `t` times the last v.
+    fn advance(&mut self, t: f64);
+}
+
+/// α of a step's first solve: what is elastic and not affine adds up to about twice D.
+const FIRST_ALPHA: f64 = 0.5;
+/// Bounds of α.
+const ALPHAS: [f64; 2] = [1.0e-3, 1.0e3];
+
+impl ProjectedGradient {
+    /// Begins a step.
+    pub fn begin(&mut self) {
+        self.alpha = FIRST_ALPHA;
+    }
+
+    /// Improves forces z with gradient `r = W z + b`, which is kept so, by at most `budget` products.
+    pub fn solve(
+        &mut self,
+        metric: &ConeMetric,
+        [z, r]: [&mut [f64]; 2],
+        tolerance: ConeTolerance,
+        budget: usize,
+        operator: &mut impl ConeOperator,
+    ) -> GradientWork {
+        let mut work = GradientWork { products: 0, error: metric.error(z, r, tolerance) };
+        while work.error > tolerance.relative && work.products < budget {
+            let problem = CoarseProblem { metric, z, r, alpha: self.alpha };
+            self.coarse.solve(&problem, [&mut self.d, &mut self.VVd]);
+            let slope = product(r, &self.d);
+            if !(slope < 0.0) {
+                break;
+            }
+            operator.multiply(&self.d, &mut self.Wd);
+            work.products += 1;
+            let curvature = product(&self.d, &self.Wd);
+            let t = if curvature > 0.0 { (-slope / curvature).min(1.0) } else { 1.0 };
+            for k in 0..z.len() {
+                z[k] += t * self.d[k];
+                r[k] += t * self.Wd[k];
+            }
+            operator.advance(t);
+            self.choose_alpha(metric, work.products);
+            work.error = metric.error(z, r, tolerance);
+        }
+        work
+    }
+
+    /// The two lengths of Barzilai and Borwein in turn [Dai & Fletcher 2005], of what of W is not in V Vᵀ.
+    fn choose_alpha(&mut self, metric: &ConeMetric, products: usize) {
+        let (mut dDd, mut dRd, mut RDR) = (0.0, 0.0, 0.0);
+        for contact in &metric.contacts {
+            for k in contact.first..contact.first + contact.dimension {
+                let rest = self.Wd[k] - self.VVd[k];
+                dDd += self.d[k] * self.d[k] * contact.D;
+                dRd += self.d[k] * rest;
+                RDR += rest * rest / contact.D;
+            }
+        }
+        if dRd > 0.0 {
+            let alpha = if products % 2 == 1 { dDd / dRd } else { dRd / RDR };
+            self.alpha = alpha.clamp(ALPHAS[0], ALPHAS[1]);
+        }
+    }
+}
+
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

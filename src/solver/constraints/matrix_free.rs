@@ -1,0 +1,110 @@
+//! Products with the Delassus operator `W = J P Jᵀ + h² J M⁻¹ Jᵀ` that never make it: forces are laid on nodes and
+//! rigid bodies, every touched body solves once with its own factor, and its motion is read off at the contacts.
+
+use super::context::SolveContext;
+use super::rigid_proxy::Reaction;
+use crate::contact::{Constraint, Endpoint};
+use crate::math::Vec3;
+use crate::solver::body_step::{BodyProblem, Factors};
+use crate::solver::cone::ConeOperator;
+
+/// What the last product has moved.
+#[derive(Default)]
+pub(super) struct Response {
+    bodies: Vec<BodyResponse>,
+    reactions: Vec<Reaction>,
+}
+
+#[derive(Default)]
+struct BodyResponse {
+    is_touched: bool,
+    /// \[N\].
+    forces: Vec<Vec3>,
+    /// \[m\].
+    motions: Vec<Vec3>,
+}
+
+/// W of these constraints.
+pub(super) struct MatrixFree<'a> {
+    pub constraints: &'a [Constraint],
+    pub bodies: &'a mut [BodyProblem],
+    pub factors: Factors<'a>,
+    pub context: &'a SolveContext<'a>,
+    pub response: &'a mut Response,
+}
+
+impl MatrixFree<'_> {
+    fn begin(&mut self) {
+        let Response { bodies, reactions } = &mut *self.response;
+        bodies.resize_with(self.bodies.len(), BodyResponse::default);
+        for (response, body) in bodies.iter_mut().zip(&*self.bodies) {
+            response.is_touched = false;
+            response.forces.clear();
+            response.forces.resize(body.x_start.len(), Vec3::zeros());
+            response.motions.resize(body.x_start.len(), Vec3::zeros());
+        }
+        reactions.clear();
+        reactions.resize(self.context.proxies.list.len(), Reaction::default());
+    }
+
+    fn scatter(&mut self, constraint: &Constraint, rows: &[f64]) {
+        if rows.iter().all(|v| *v == 0.0) {
+            return;
+        }
+        let force = constraint.force(rows);
+        let Response { bodies, reactions } = &mut *self.response;
+        for (endpoint, sign) in constraint.endpoints.iter().zip([1.0, -1.0]) {
+            let Endpoint::Soft { body, .. } = endpoint else {
+                self.context.proxies.add_reaction(endpoint, &(force * sign), self.context.h, reactions);
+                continue;
+            };
+            bodies[*body].is_touched = true;
+            for (node, weight) in endpoint.soft_nodes() {
+                bodies[*body].forces[node] += force * (sign * weight);
+            }
+        }
+    }
+
+    fn motion(&self, endpoint: &Endpoint) -> Vec3 {
+        match endpoint {
+            Endpoint::Soft { body, .. } => {
+                let response = &self.response.bodies[*body];
+                if response.is_touched { endpoint.interpolate(&response.motions) } else { Vec3::zeros() }
+            }
+            _ => self.context.proxies.response(endpoint, &self.response.reactions, self.context.h),
+        }
+    }
+}
+
+impl ConeOperator for MatrixFree<'_> {
+    fn multiply(&mut self, v: &[f64], out: &mut Vec<f64>) {
+        self.begin();
+        let mut first = 0;
+        for constraint in self.constraints {
+            let rows = &v[first..first + constraint.dimension()];
+            first += rows.len();
+            self.scatter(constraint, rows);
+        }
+        for (index, (body, response)) in self.bodies.iter_mut().zip(&mut self.response.bodies).enumerate() {
+            if response.is_touched {
+                body.respond(self.factors.of(index, body), &response.forces, &mut response.motions);
+            }
+        }
+        out.clear();
+        for constraint in self.constraints {
+            let [a, b] = &constraint.endpoints;
+            let moved = self.motion(a) - self.motion(b);
+            let normal = out.len();
+            out.extend(constraint.directions().iter().map(|d| d.dot(&moved)));
+            out[normal] += constraint.compliance * v[normal];
+        }
+    }
+
+    fn advance(&mut self, t: f64) {
+        for (body, response) in self.bodies.iter_mut().zip(&self.response.bodies) {
+            if response.is_touched {
+                body.trial.x.iter_mut().zip(&response.motions).for_each(|(x, m)| *x += m * t);
+            }
+        }
+    }
+}

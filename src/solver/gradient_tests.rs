@@ -1,0 +1,61 @@
+//! Projected gradients against the optimum, and wherever they are stopped.
+
+use super::cone::{ConeMetric, ConeOperator, ConeProblem, ConeTolerance, MetricContact, ProjectedGradient};
+use super::tests::{brute_force, objective, random_problem};
+use proptest::prelude::*;
+
+struct Dense<'a>(&'a ConeProblem);
+
+impl ConeOperator for Dense<'_> {
+    fn multiply(&mut self, v: &[f64], out: &mut Vec<f64>) {
+        self.0.multiply(v, out);
+    }
+
+    fn advance(&mut self, _: f64) {}
+}
+
+fn solve(problem: &ConeProblem, products: usize) -> Vec<f64> {
+    let mut diagonal = Vec::new();
+    problem.W.diagonal(&mut diagonal);
+    let contact = |i: usize| MetricContact {
+        law: problem.laws[i],
+        first: 3 * i,
+        dimension: 3,
+        D: diagonal[3 * i..3 * i + 3].iter().sum::<f64>() / 3.0,
+        sides: [None; 2],
+    };
+    let mut metric = ConeMetric::default();
+    metric.contacts.extend((0..problem.contacts()).map(contact));
+    metric.index_columns();
+    let (mut z, mut r) = (vec![0.0; problem.rows()], problem.g.clone());
+    let mut method = ProjectedGradient::default();
+    method.begin();
+    let tolerance = ConeTolerance { relative: 1e-12, floor: 1e-9 };
+    let work = method.solve(&metric, [&mut z, &mut r], tolerance, products, &mut Dense(problem));
+    assert!(work.products <= products);
+    z
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn every_iterate_is_in_its_cones_and_none_is_worse_than_the_one_before(
+        contacts in 1usize..5, rank in 3usize..12, mu in 0.1..1.0f64,
+        numbers in proptest::collection::vec(-1.0..1.0f64, 60),
+    ) {
+        let problem = random_problem(contacts, rank, mu, &numbers);
+        let mut before = 0.0;
+        for products in 1..40 {
+            let z = solve(&problem, products);
+            for i in 0..contacts {
+                prop_assert!(z[3 * i + 1].hypot(z[3 * i + 2]) <= mu * z[3 * i] + 1e-12);
+            }
+            let now = objective(&problem, &z);
+            // Rounding of sums of size one.
+            prop_assert!(now <= before + 1e-12, "{now} after {before} at {products}");
+            before = now;
+        }
+        let (found, best) = (objective(&problem, &solve(&problem, 3000)), objective(&problem, &brute_force(&problem)));
+        prop_assert!(found <= best + 1e-6 * (1.0 + best.abs()), "{found} against {best}");
+    }
+}
