@@ -30,8 +30,6 @@ const STAGE_TOLERANCE: f64 = 3.0e-3;
 /// Newton steps on a stage of the continuation.
 const STAGE_STEPS: usize = 40;
 /// Stages tried when warm start and short continuation failed.
-
-/// Stages tried when warm start and short continuation failed.
 const FINE_STAGES: [f64; 7] = [1.0, 0.1, 1e-2, 3e-3, 1e-3, 3e-4, EPSILON];
 
 /// How a solve goes about it.

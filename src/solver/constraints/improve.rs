@@ -90,10 +90,11 @@ impl ContactSystem {
         let budget = around.context.limits.products as f64;
         let factorization = self.groups.factor_work() as f64 / self.product_work(bodies, around.factors);
         let [affordable, cheap] = AFFORDABLE.map(|share| may_factorize && factorization <= share * budget);
-        if affordable && (cheap || self.work.error <= NEARLY_STILL) && !self.dense.has_failed {
-            if let Some(changed) = self.spend_on_newton(bodies, around, Newton::WARM, factorization) {
-                return changed;
-            }
+        let tries_newton = affordable && (cheap || self.work.error <= NEARLY_STILL) && !self.dense.has_failed;
+        if tries_newton
+            && let Some(changed) = self.spend_on_newton(bodies, around, Newton::WARM, factorization)
+        {
+            return changed;
         }
         let (first, mut near, mut changed) = (self.work.error, NEARLY_STILL, false);
         for round in 0..SHIFT_ROUNDS[1] {
