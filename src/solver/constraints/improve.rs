@@ -14,9 +14,6 @@ use crate::solver::cone::{ConeTolerance, GradientWork, Newton};
 /// Bodies of an island from which on it is a crowd: in heaps the worst step of Newton's method takes 200 ms with eight
 /// bodies and 2400 ms with 48. Fewer stand on one another in towers, which want its accuracy.
 const CROWD: usize = 6;
-/// Operations of a factorization of `I + LᵀWL` from which on an island is a crowd: some 220 contacts with one another, or a tower
-/// of ten with 50 in each of its interfaces. A landing takes some tens of factorizations.
-const DEAR: usize = 100_000_000;
 /// Operations of the factorizations of a small island in a step, at the most. A landing takes 1e7; what is crushed by a thousand
 /// times its mass at 1e3 Pa and 1/10 s takes 1.6e9, and at half of that ends below the floor.
 const SMALL_WORK: usize = 20_000_000_000;
@@ -67,8 +64,7 @@ impl ContactSystem {
         let around = Around { factors, context, tolerance };
         self.measure(bodies, context);
         let has_columns = bodies.iter().enumerate().all(|(i, b)| factors.has_columns(i, b));
-        let is_small =
-            bodies.len() < CROWD && self.groups.factor_work() <= DEAR && self.spent.operations < SMALL_WORK;
+        let is_small = bodies.len() < CROWD && self.spent.operations < SMALL_WORK;
         if is_small && has_columns {
             return self.solve_small(bodies, around);
         }
