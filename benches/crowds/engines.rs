@@ -1,10 +1,10 @@
 //! One scene, stepped by either engine.
 
 use crate::clock::timed;
-use crate::shared::rapier_body;
+use crate::scene::{Scene, Soft, Way};
+use crate::{ours, theirs};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
-use std::sync::Arc;
 
 #[derive(Clone, Copy, PartialEq)]
 pub enum Engine {
@@ -23,108 +23,55 @@ impl Engine {
     }
 }
 
-/// A soft body of a scene.
-#[derive(Clone)]
-pub struct Soft {
-    pub mesh: Arc<TetMesh>,
-    pub pose: Pose,
-    pub e: f64,
-    pub nu: f64,
-    /// Vertices that are held.
-    pub pinned: Vec<usize>,
-}
-
-impl Soft {
-    pub fn new(mesh: &Arc<TetMesh>, pose: Pose) -> Self {
-        Self { mesh: mesh.clone(), pose, e: 1e6, nu: 0.3, pinned: Vec::new() }
-    }
-}
-
-/// A rigid body, and where it goes if it is kinematic.
-#[derive(Clone)]
-pub struct Rigid {
-    pub body: RigidBodyBuilder,
-    pub collider: ColliderBuilder,
-    pub way: Option<Way>,
-}
-
-impl Rigid {
-    pub fn new(body: RigidBodyBuilder, collider: ColliderBuilder) -> Self {
-        Self { body, collider: collider.friction(0.5), way: None }
-    }
-}
-
-/// There with a velocity, and back.
-#[derive(Clone, Copy)]
-pub struct Way {
-    pub velocity: Vector,
-    /// Steps at which it sets out, turns and is back.
-    pub at: [usize; 3],
-}
-
-impl Way {
-    fn velocity(&self, step: usize) -> Vector {
-        let [out, turn, back] = self.at;
-        match step {
-            _ if step < out || step >= back => Vector::ZERO,
-            _ if step < turn => self.velocity,
-            _ => -self.velocity,
-        }
-    }
-}
-
-#[derive(Clone)]
-pub struct Scene {
-    pub name: String,
-    pub soft: Vec<Soft>,
-    pub rigid: Vec<Rigid>,
-    /// Repeated until the end \[s\].
-    pub dt: Vec<f32>,
-    pub steps: usize,
-    /// Whether `prepare` is called, as while loading.
-    pub prepared: bool,
-    /// Ends after the step that exceeds it \[s of computing\].
-    pub cap: f64,
-}
-
-impl Scene {
-    pub fn dt(&self, step: usize) -> f32 {
-        self.dt[step % self.dt.len()]
-    }
-
-    pub fn tets(&self) -> usize {
-        self.soft.iter().map(|s| s.mesh.tetrahedra().len()).sum()
-    }
-}
-
 /// What a scene took and came to.
 #[derive(Default)]
 pub struct Run {
     /// Of every step \[ms\].
     pub times: Vec<f64>,
+    /// Of every step, ours only.
+    pub counters: Vec<DeformableCounters>,
     /// Building and inserting the bodies \[ms\].
     pub insertion: f64,
     /// Deepest place of a node in a rigid shape, at the end of any step \[m\].
     pub deepest: f64,
-    /// Least volume of all bodies over the one at rest, and that at the end.
+    /// Least volume of all solids over the one at rest, and that at the end.
     pub volume: [f64; 2],
     /// Largest ever \[bytes\].
     pub factor: usize,
     pub columns: usize,
+    /// Of both and the state together, and the state alone \[bytes\].
+    pub peak: usize,
+    pub state: usize,
+    /// Since when every body that may sleep does \[s\].
+    pub asleep: Option<f64>,
+    /// How many of them do not, at the end.
+    pub awake: usize,
     pub finite: bool,
 }
 
-struct Stage {
-    physics: PhysicsWorld,
+/// The rigid part of a scene, and what moves it.
+pub struct Stage {
+    pub physics: PhysicsWorld,
+    pub rigid: Vec<RigidBodyHandle>,
     movers: Vec<(RigidBodyHandle, Way)>,
     solids: Vec<ColliderHandle>,
 }
 
+/// What a step left, to be looked at.
+struct Seen {
+    bodies: Vec<Vec<Vector>>,
+    /// Bodies that may sleep and do not.
+    awake: usize,
+}
+
 impl Stage {
-    fn new(scene: &Scene) -> Self {
-        let mut stage = Self { physics: PhysicsWorld::new(), movers: Vec::new(), solids: Vec::new() };
+    pub fn new(scene: &Scene) -> Self {
+        let physics = PhysicsWorld::new();
+        let mut stage = Self { physics, rigid: Vec::new(), movers: Vec::new(), solids: Vec::new() };
         for rigid in &scene.rigid {
-            let (body, collider) = stage.physics.insert(rigid.body.clone(), rigid.collider.clone());
+            let body = if scene.sleeps { rigid.body.clone() } else { rigid.body.clone().can_sleep(false) };
+            let (body, collider) = stage.physics.insert(body, rigid.collider.clone());
+            stage.rigid.push(body);
             stage.solids.push(collider);
             stage.movers.extend(rigid.way.map(|way| (body, way)));
         }
@@ -139,13 +86,25 @@ impl Stage {
         }
     }
 
-    fn depth(&self, p: Vector) -> f64 {
+    fn deepest<'a>(&self, nodes: impl Iterator<Item = &'a Vector>) -> f64 {
         let solids = self.solids.iter().map(|c| &self.physics.colliders[*c]);
-        let depth = |c: &Collider| {
-            let foot = c.shape().project_point(c.position(), p, false);
-            if foot.is_inside { f64::from((foot.point - p).length()) } else { 0.0 }
+        // Most are far from most nodes.
+        let solids: Vec<(&Collider, Aabb)> = solids.map(|c| (c, c.compute_aabb())).collect();
+        let depth = |p: &Vector| {
+            let near = solids.iter().filter(|(_, aabb)| aabb.contains_local_point(*p));
+            let feet = near.map(|(c, _)| c.shape().project_point(c.position(), *p, false));
+            let depths = feet.filter(|foot| foot.is_inside).map(|foot| f64::from((foot.point - *p).length()));
+            depths.fold(0.0, f64::max)
         };
-        solids.map(depth).fold(0.0, f64::max)
+        nodes.map(depth).fold(0.0, f64::max)
+    }
+
+    fn awake_rigid(&self) -> usize {
+        let awake = |h: &&RigidBodyHandle| {
+            let body = &self.physics.bodies[**h];
+            body.is_dynamic() && !body.is_sleeping()
+        };
+        self.rigid.iter().filter(awake).count()
     }
 }
 
@@ -159,29 +118,36 @@ fn volume(mesh: &TetMesh, at: &[Vector]) -> f64 {
 }
 
 impl Run {
-    fn observe(&mut self, scene: &Scene, stage: &Stage, bodies: &[Vec<Vector>]) {
-        let rest: f64 = scene.soft.iter().map(|s| s.mesh.volume()).sum();
-        let now: f64 = scene.soft.iter().zip(bodies).map(|(s, at)| volume(&s.mesh, at)).sum();
+    fn observe(&mut self, scene: &Scene, stage: &Stage, seen: &Seen) {
+        let rest: f64 = scene.soft.iter().filter_map(Soft::mesh).map(|mesh| mesh.volume()).sum();
+        let solids = scene.soft.iter().zip(&seen.bodies).filter_map(|(s, at)| Some((s.mesh()?, at)));
+        let now: f64 = solids.map(|(mesh, at)| volume(mesh, at)).sum();
         self.volume = [self.volume[0].min(now / rest), now / rest];
-        self.deepest = bodies.iter().flatten().map(|p| stage.depth(*p)).fold(self.deepest, f64::max);
-        self.finite = bodies.iter().flatten().all(|p| p.is_finite());
+        let nodes = || seen.bodies.iter().flatten();
+        self.deepest = self.deepest.max(stage.deepest(nodes()));
+        self.finite = nodes().all(|p| p.is_finite());
+        self.awake = seen.awake + stage.awake_rigid();
+        let now: f64 = (0..self.times.len()).map(|k| f64::from(scene.dt(k))).sum();
+        // From then on to the end.
+        self.asleep = if self.awake == 0 { self.asleep.or(Some(now)) } else { None };
     }
 
-    /// Steps to the end of the scene or of its time.
+    /// Steps to the end of the scene or of its time, or until all sleep that may.
     fn go(
         scene: &Scene,
         stage: &mut Stage,
         insertion: f64,
-        mut step: impl FnMut(&mut PhysicsWorld, &mut Run) -> Vec<Vec<Vector>>,
+        mut step: impl FnMut(&mut PhysicsWorld, &mut Run) -> Seen,
     ) -> Self {
         let mut run = Run { insertion, volume: [1.0; 2], ..Run::default() };
+        let may_end = scene.sleeps && scene.soft.iter().all(|s| s.can_sleep);
         let mut spent = 0.0;
         for k in 0..scene.steps {
             stage.begin(scene, k);
-            let bodies = step(&mut stage.physics, &mut run);
-            run.observe(scene, stage, &bodies);
+            let seen = step(&mut stage.physics, &mut run);
+            run.observe(scene, stage, &seen);
             spent += run.times[k] * 1e-3;
-            if spent > scene.cap || !run.finite {
+            if spent > scene.cap || !run.finite || (may_end && run.asleep.is_some()) {
                 break;
             }
         }
@@ -191,67 +157,45 @@ impl Run {
 
 pub fn run(engine: Engine, scene: &Scene) -> Run {
     match engine {
-        Engine::Foible => ours(scene),
-        Engine::Rapier => theirs(scene),
+        Engine::Foible => run_ours(scene),
+        Engine::Rapier => run_theirs(scene),
     }
 }
 
-fn ours(scene: &Scene) -> Run {
+fn run_ours(scene: &Scene) -> Run {
     let mut stage = Stage::new(scene);
     let mut world = DeformableWorld::new();
-    let (handles, insertion) = timed(|| insert(scene, &mut world));
+    let (handles, insertion) = timed(|| ours::insert(scene, &stage.physics, &stage.rigid, &mut world));
     if scene.prepared {
         world.prepare(&stage.physics).expect("a valid step");
     }
     let mut quarantined = 0;
     let mut run = Run::go(scene, &mut stage, insertion, |physics, run| {
         run.times.push(timed(|| world.step(physics)).1);
-        let counters = world.counters();
+        let counters = *world.counters();
+        run.state = ours::state_bytes(&world);
         run.factor = run.factor.max(counters.factor_bytes);
         run.columns = run.columns.max(counters.column_bytes);
+        run.peak = run.peak.max(counters.factor_bytes + counters.column_bytes + run.state);
+        run.counters.push(counters);
         quarantined += counters.quarantined;
-        handles.iter().map(|h| world.bodies[*h].positions().collect()).collect()
+        let bodies = handles.iter().map(|h| world.bodies[*h].positions().collect()).collect();
+        let awake = world.bodies.iter().filter(|(_, b)| b.can_sleep() && !b.is_sleeping()).count();
+        Seen { bodies, awake }
     });
     // A body that is put aside keeps the last state that was finite.
     run.finite &= quarantined == 0;
     run
 }
 
-/// Equal meshes share a model.
-fn insert(scene: &Scene, world: &mut DeformableWorld) -> Vec<DeformableBodyHandle> {
-    let mut models: Vec<(&Arc<TetMesh>, Arc<DeformableModel>)> = Vec::new();
-    let mut handles = Vec::new();
-    for soft in &scene.soft {
-        let known = models.iter().find(|(mesh, _)| Arc::ptr_eq(mesh, &soft.mesh));
-        let model = match known {
-            Some((_, model)) => model.clone(),
-            None => Arc::new(DeformableModel::new(&soft.mesh)),
-        };
-        models.push((&soft.mesh, model.clone()));
-        let material = DeformableMaterial::new(soft.e, soft.nu).friction(0.5);
-        let builder = DeformableBodyBuilder::model(model).pose(soft.pose).material(material);
-        let handle = world.insert(builder.can_sleep(false)).expect("a valid body");
-        let body = &mut world.bodies[handle];
-        soft.pinned.iter().for_each(|&v| body.pin(v).expect("a vertex"));
-        handles.push(handle);
-    }
-    handles
-}
-
-fn theirs(scene: &Scene) -> Run {
+fn run_theirs(scene: &Scene) -> Run {
     let mut stage = Stage::new(scene);
-    let (handles, insertion) = timed(|| {
-        let insert = |soft: &Soft| {
-            // The shape is the body's own surface.
-            let surface = ColliderBuilder::ball(0.02).density(0.0).friction(0.5);
-            let pinned = soft.pinned.iter().map(|&v| v as u32);
-            let builder = rapier_body(&soft.mesh, soft.pose, soft.e, soft.nu).surface_collider(surface);
-            stage.physics.insert_soft_body(builder.pinned_particles(pinned))
-        };
-        scene.soft.iter().map(insert).collect::<Vec<_>>()
-    });
+    let (handles, insertion) = timed(|| theirs::insert(scene, &mut stage.physics, &stage.rigid));
     Run::go(scene, &mut stage, insertion, |physics, run| {
         run.times.push(timed(|| physics.step()).1);
-        handles.iter().map(|h| physics.soft_bodies[*h].particle_positions().collect()).collect()
+        let bodies: Vec<_> = handles.iter().map(|h| &physics.soft_bodies[*h]).collect();
+        let awake =
+            bodies.iter().zip(&scene.soft).filter(|(b, soft)| soft.can_sleep && !b.is_sleeping()).count();
+        Seen { bodies: bodies.iter().map(|b| b.particle_positions().collect()).collect(), awake }
     })
 }

@@ -1,6 +1,6 @@
 //! Random scenes: bodies that overlap at the start, that are struck by kinematic ones, or that lie among rigid ones.
 
-use crate::engines::{Rigid, Scene, Soft, Way};
+use crate::scene::{Rigid, Scene, Soft, Way};
 use crate::scenes::{cube, floor};
 use rapier3d::prelude::*;
 
@@ -24,7 +24,7 @@ impl Random {
         (self.next() >> 40) as f32 / (1u64 << 24) as f32
     }
 
-    fn between(&mut self, low: f32, high: f32) -> f32 {
+    pub fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.unit()
     }
 
@@ -66,8 +66,7 @@ pub fn scene(seed: u64) -> Scene {
         let count = 1 + random.below(3);
         rigid.extend((0..count).map(|k| block(k, &mut random)));
     }
-    let name = format!("random {seed}");
-    Scene { name, soft, rigid, dt: vec![1.0 / 60.0], steps: 120, prepared: true, cap: 6.0 }
+    Scene { steps: 120, cap: 6.0, ..Scene::new(format!("random {seed}"), soft, rigid) }
 }
 
 fn soft(k: usize, apart: f32, random: &mut Random) -> Soft {

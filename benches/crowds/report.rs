@@ -1,6 +1,8 @@
-//! The table, and the file of its numbers.
+//! The table, the worst steps, what claims are held against, and the file of the numbers.
 
-use crate::engines::{Engine, Run, Scene};
+use crate::engines::{Engine, Run};
+use crate::scene::Scene;
+use foible3d::DeformableCounters;
 use std::fmt::Write as _;
 
 /// Of the steps of a run \[ms\].
@@ -26,21 +28,32 @@ impl Times {
     }
 }
 
-/// Median of the last second, of a run with exactly the steps of its scene.
-pub fn settled(scene: &Scene, times: &[f64]) -> Option<f64> {
-    if times.len() != scene.steps {
-        return None;
-    }
-    let (mut first, mut left) = (scene.steps, 1.0 - 1e-4);
+/// Median of the last second of a run.
+pub fn last_second(scene: &Scene, times: &[f64]) -> f64 {
+    let (mut first, mut left) = (times.len(), 1.0 - 1e-4);
     while left > 0.0 && first > 0 {
         first -= 1;
         left -= scene.dt(first);
     }
-    Some(Times::of(&times[first..]).median)
+    Times::of(&times[first..]).median
+}
+
+/// The same, of a run with exactly the steps of its scene.
+pub fn settled(scene: &Scene, times: &[f64]) -> Option<f64> {
+    (times.len() == scene.steps).then(|| last_second(scene, times))
+}
+
+/// A ratio of this run.
+pub struct Measured {
+    pub scene: String,
+    pub what: &'static str,
+    pub value: f64,
 }
 
 pub struct Report {
     csv: String,
+    worst: String,
+    pub measured: Vec<Measured>,
     /// Scenes of ours that did not end finite.
     pub broken: Vec<String>,
 }
@@ -50,7 +63,7 @@ impl Report {
         println!("| scene | engine | mean | median | 99 % | worst | settled | steps | also |");
         println!("|---|---|---|---|---|---|---|---|---|");
         let csv = "scene,engine,tets,mean_ms,median_ms,p99_ms,worst_ms,settled_ms,steps,of,also\n".into();
-        Self { csv, broken: Vec::new() }
+        Self { csv, worst: String::new(), measured: Vec::new(), broken: Vec::new() }
     }
 
     /// Prints and keeps a line.
@@ -60,7 +73,8 @@ impl Report {
         let settled = settled(scene, &run.times);
         let shown = settled.map_or("–".into(), brief);
         let (done, of) = (run.times.len(), scene.steps);
-        let steps = if done < of { format!("**{done} of {of}**") } else { format!("{done}") };
+        let early = done < of && run.asleep.is_none();
+        let steps = if early { format!("**{done} of {of}**") } else { format!("{done}") };
         let unsound = if run.finite { "" } else { " NOT FINITE" };
         let columns = [mean, median, p99, worst].map(brief).join(" | ");
         println!("| {name} | {engine_name} | {columns} | {shown} | {steps} | {also}{unsound} |");
@@ -75,13 +89,56 @@ impl Report {
         }
     }
 
+    /// Keeps a ratio for the claims, and gives it back.
+    pub fn measure(&mut self, scene: &str, what: &'static str, value: f64) -> f64 {
+        self.measured.push(Measured { scene: scene.into(), what, value });
+        value
+    }
+
+    /// Keeps what the worst steps of a run of ours did.
+    pub fn worst_steps(&mut self, name: &str, run: &Run, count: usize) {
+        let mut order: Vec<usize> = (0..run.counters.len()).collect();
+        order.sort_by(|a, b| run.times[*b].total_cmp(&run.times[*a]));
+        for k in order.into_iter().take(count) {
+            let _ = writeln!(
+                self.worst,
+                "| {name} | {} | {}",
+                k + 1,
+                what_it_did(run.times[k], &run.counters[k])
+            );
+        }
+    }
+
     pub fn write(&self) {
+        println!("\nOur worst steps, times in ms:\n");
+        println!(
+            "| scene | step | time | contacts | carry | Newton | factored | products | error | failed | iterations | rejected | sparse \
+             factors | columns | factors | detection | solve | contact |"
+        );
+        println!("|{}\n{}", "---|".repeat(18), self.worst);
         let path = "target/crowds.csv";
         match std::fs::write(path, &self.csv) {
-            Ok(()) => println!("\nwritten: {path}"),
+            Ok(()) => println!("written: {path}"),
             Err(error) => eprintln!("{path}: {error}"),
         }
     }
+}
+
+fn what_it_did(time: f64, c: &DeformableCounters) -> String {
+    let ms = |time: std::time::Duration| brief(time.as_secs_f64() * 1e3);
+    let counts =
+        [c.contacts, c.active_contacts, c.newton_steps, c.contact_factorizations, c.contact_products];
+    let more = [c.contact_failures, c.iterations, c.rejected_steps, c.factorizations, c.columns];
+    let times = [c.factor_time, c.detection_time, c.solve_time, c.contact_time];
+    let join = |counts: [usize; 5]| counts.map(|n| n.to_string()).join(" | ");
+    format!(
+        "{} | {} | {:.0e} | {} | {} |",
+        brief(time),
+        join(counts),
+        c.contact_error,
+        join(more),
+        times.map(ms).join(" | ")
+    )
 }
 
 /// Three digits.

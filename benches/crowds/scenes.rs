@@ -1,14 +1,12 @@
 //! The scenes.
 
-use crate::engines::{Rigid, Scene, Soft, Way};
 use crate::random::Random;
+use crate::scene::{Rigid, Scene, Soft, Way};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 use std::sync::Arc;
 
 const H: f32 = 1.0 / 60.0;
-/// Seconds of computing that a scene may take in either engine.
-const CAP: f64 = 60.0;
 
 pub fn cube(half: f64, cells: [usize; 3]) -> Arc<TetMesh> {
     Arc::new(TetMesh::cuboid([half; 3], cells).expect("a valid lattice"))
@@ -41,15 +39,13 @@ pub fn heap(count: usize) -> Scene {
         rigid.push(wall(Vector::new(sign * side, high, 0.0), Vector::new(0.25, high, 2.0)));
         rigid.push(wall(Vector::new(0.0, high, sign * side), Vector::new(2.0, high, 0.25)));
     }
-    Scene {
-        name: format!("heap of {count} cubes"),
-        soft: (0..count).map(|k| Soft::new(&mesh, place(k, &mut random))).collect(),
-        rigid,
-        dt: vec![H],
-        steps: 180,
-        prepared: true,
-        cap: CAP,
-    }
+    let soft = (0..count).map(|k| Soft::new(&mesh, place(k, &mut random))).collect();
+    Scene::new(format!("heap of {count} cubes"), soft, rigid)
+}
+
+/// The same, allowed to sleep, for at the most ten seconds.
+pub fn sleeping_heap(count: usize) -> Scene {
+    Scene { sleeps: true, steps: 600, cap: 120.0, ..heap(count) }
 }
 
 /// The step at which the capsule sets out.
@@ -66,58 +62,81 @@ pub fn pinch() -> Scene {
     let mut capsule = Rigid::new(body, ColliderBuilder::capsule_x(0.4, radius));
     let at = [PINCH_OUT, PINCH_OUT + WAY, PINCH_OUT + 2 * WAY];
     capsule.way = Some(Way { velocity: Vector::Y * -SPEED, at });
-    Scene {
-        name: "pinch at 5 m/s".into(),
-        soft: vec![Soft::new(&cube(0.2, [4; 3]), Pose::from_translation(Vector::Y * 0.2))],
-        rigid: vec![floor(), capsule],
-        dt: vec![H],
-        steps: 180,
-        prepared: true,
-        cap: CAP,
-    }
+    let cube = Soft::new(&cube(0.2, [4; 3]), Pose::from_translation(Vector::Y * 0.2));
+    Scene::new("pinch at 5 m/s", vec![cube], vec![floor(), capsule])
 }
 
 /// A cube dropped flat by 0.3 m, nothing made ahead.
 pub fn first_touch(cells: usize) -> Scene {
     let mesh = cube(0.2, [cells; 3]);
-    Scene {
-        name: format!("first touch, {} tets", mesh.tetrahedra().len()),
-        soft: vec![Soft::new(&mesh, Pose::from_translation(Vector::Y * 0.5))],
-        rigid: vec![floor()],
-        dt: vec![H],
-        steps: 120,
-        prepared: false,
-        cap: CAP / 3.0,
+    let name = format!("first touch, {} tets", mesh.tetrahedra().len());
+    let soft = Soft::new(&mesh, Pose::from_translation(Vector::Y * 0.5));
+    Scene { steps: 120, prepared: false, cap: 20.0, ..Scene::new(name, vec![soft], vec![floor()]) }
+}
+
+/// A slab of cells of 2 cm, so many across and two high, dropped flat by 0.3 m, nothing made ahead: all of its lower
+/// nodes touch in the same step.
+pub fn slab(across: usize) -> Scene {
+    const CELL: f64 = 0.02;
+    const HIGH: usize = 2;
+    let half = [across, HIGH, across].map(|cells| CELL / 2.0 * cells as f64);
+    let mesh = Arc::new(TetMesh::cuboid(half, [across, HIGH, across]).expect("a valid lattice"));
+    let name = format!("slab of {} contacts, {} tets", (across + 1).pow(2), mesh.tetrahedra().len());
+    let soft = Soft::new(&mesh, Pose::from_translation(Vector::Y * (0.3 + half[1] as f32)));
+    Scene { steps: 120, prepared: false, cap: 20.0, ..Scene::new(name, vec![soft], vec![floor()]) }
+}
+
+/// How long the steps of a scene are.
+#[derive(Clone, Copy)]
+pub enum Steps {
+    Constant,
+    /// A pattern of long and short ones.
+    Two,
+    /// No two alike, at random.
+    Any,
+}
+
+impl Steps {
+    /// Their lengths for three seconds, within 1 %.
+    fn lengths(self) -> (Vec<f32>, usize) {
+        const LONG: f32 = 1.0 / 30.0;
+        const SHORT: f32 = 1.0 / 144.0;
+        match self {
+            Steps::Constant => (vec![H], 180),
+            Steps::Two => (vec![SHORT, LONG, SHORT, SHORT, LONG, LONG], 150),
+            Steps::Any => {
+                let mut random = Random::new(11);
+                let (mut all, mut time) = (Vec::new(), 0.0);
+                while time < 3.0 {
+                    all.push(random.between(SHORT, LONG));
+                    time += all[all.len() - 1];
+                }
+                let count = all.len();
+                (all, count)
+            }
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Steps::Constant => "1/60 s",
+            Steps::Two => "1/144 and 1/30 s",
+            Steps::Any => "1/144 to 1/30 s",
+        }
     }
 }
 
-/// A cube of 1920 tets that swings from an edge, or tumbles onto a floor, for three seconds: at 1/60 s, or by a
-/// pattern of long and short steps.
-pub fn variable_step(swings: bool, varies: bool) -> Scene {
-    const LONG: f32 = 1.0 / 30.0;
-    const SHORT: f32 = 1.0 / 144.0;
+/// A cube of 1920 tets that swings from an edge, or tumbles onto a floor, for three seconds.
+pub fn variable_step(swings: bool, lengths: Steps) -> Scene {
     let mesh = cube(0.2, [8, 8, 6]);
     let mut soft = Soft::new(&mesh, Pose::new(Vector::Y * 0.6, Vector::new(0.3, 0.2, 0.5)));
     let mut rigid = vec![floor()];
     if swings {
-        let held = |p: &[f64; 3]| p[0] < -0.2 + 1e-6 && p[1] > 0.2 - 1e-6;
-        soft.pinned = (0..mesh.vertices().len()).filter(|&v| held(&mesh.vertices()[v])).collect();
+        soft.held = Some(|p| p[0] < -0.2 + 1e-6 && p[1] > 0.2 - 1e-6);
         soft.pose = Pose::from_translation(Vector::Y * 2.0);
         rigid.clear();
     }
     let what = if swings { "swings" } else { "lands" };
-    // 150 steps of the pattern last as long as 180 of 1/60 s, within 0.7 %.
-    let (dt, steps, how) = match varies {
-        true => (vec![SHORT, LONG, SHORT, SHORT, LONG, LONG], 150, "1/144 and 1/30 s"),
-        false => (vec![H], 180, "1/60 s"),
-    };
-    Scene {
-        name: format!("{what}, {how}"),
-        soft: vec![soft],
-        rigid,
-        dt,
-        steps,
-        prepared: true,
-        cap: CAP / 3.0,
-    }
+    let (dt, steps) = lengths.lengths();
+    Scene { dt, steps, cap: 20.0, ..Scene::new(format!("{what}, {}", lengths.name()), vec![soft], rigid) }
 }

@@ -1,0 +1,217 @@
+//! The groups of scenes: each run in both engines, and said in a line.
+
+use crate::claims::*;
+use crate::engines::{self, Engine, Run};
+use crate::report::{Report, Times, brief, last_second, settled};
+use crate::scene::Scene;
+use crate::scenes::{self, Steps};
+use crate::{level, random, rollback};
+
+/// Runs of both engines.
+fn both(scene: &Scene) -> [Run; 2] {
+    Engine::BOTH.map(|engine| engines::run(engine, scene))
+}
+
+/// Keeps our mean, median, 99 % and worst over rapier's, where both came equally far, and says them.
+fn compare(scene: &Scene, [ours, theirs]: &[Run; 2], report: &mut Report) -> String {
+    let steps = ours.times.len().min(theirs.times.len());
+    let (a, b) = (Times::of(&ours.times[..steps]), Times::of(&theirs.times[..steps]));
+    let mut ratio = |what, value: f64| report.measure(&scene.name, what, value);
+    let (mean, worst) = (ratio(MEAN, a.mean / b.mean), ratio(WORST, a.worst / b.worst));
+    let (median, p99) = (ratio(MEDIAN, a.median / b.median), ratio(P99, a.p99 / b.p99));
+    format!("{mean:.2} × rapier's mean, {median:.2} × median, {p99:.2} × 99 %, {worst:.2} × worst")
+}
+
+pub fn heaps(all: bool, report: &mut Report) {
+    let counts: &[usize] = if all { &[16, 48, 100, 200] } else { &[16, 48] };
+    for &count in counts {
+        let scene = scenes::heap(count);
+        let runs = both(&scene);
+        let ratios = compare(&scene, &runs, report);
+        let [ours, theirs] = &runs;
+        let deep = |run: &Run| format!("{:.1e} m deep in floor or wall", run.deepest);
+        report.line(&scene, Engine::Foible, ours, &format!("{ratios}; {}", deep(ours)));
+        report.line(&scene, Engine::Rapier, theirs, &deep(theirs));
+        report.worst_steps(&scene.name, ours, 3);
+        sleep(count, Times::of(&ours.times).worst, report);
+    }
+}
+
+/// The same heap, allowed to sleep: what it takes just before it does, or at the end.
+fn sleep(count: usize, worst: f64, report: &mut Report) {
+    let scene = Scene { name: format!("heap of {count} cubes, may sleep"), ..scenes::sleeping_heap(count) };
+    let run = engines::run(Engine::Foible, &scene);
+    // The step in which it falls asleep is the last one.
+    let settled = last_second(&scene, &run.times);
+    let name = format!("heap of {count} cubes");
+    report.measure(&name, ASLEEP, run.asleep.unwrap_or(f64::INFINITY));
+    let to_settled = report.measure(&name, WORST_TO_SETTLED, worst / settled);
+    let slept = match run.asleep {
+        Some(time) => format!("sleeps after {time:.1} s"),
+        None => format!("**{} awake at the end**", run.awake),
+    };
+    let also = format!(
+        "{slept}; last second {} ms, {} per body; worst of its fall {to_settled:.1} × that",
+        brief(settled),
+        brief(settled / count as f64),
+    );
+    report.line(&scene, Engine::Foible, &run, &also);
+}
+
+pub fn pinch(report: &mut Report) {
+    let scene = scenes::pinch();
+    for engine in Engine::BOTH {
+        let run = engines::run(engine, &scene);
+        let before = Times::of(&run.times[scenes::PINCH_OUT / 2..scenes::PINCH_OUT]).median;
+        let touched = Times::of(&run.times[scenes::PINCH_OUT..]).worst / before;
+        let also = format!(
+            "{} ms before, worst {touched:.0} ×; volume {:.2}, {:.4} at the end; {:.1e} m deep",
+            brief(before),
+            run.volume[0],
+            run.volume[1],
+            run.deepest
+        );
+        report.line(&scene, engine, &run, &also);
+        if engine == Engine::Foible {
+            report.measure(&scene.name, WORST_TO_SETTLED, touched);
+            report.worst_steps(&scene.name, &run, 3);
+        }
+    }
+}
+
+pub fn first_touches(all: bool, report: &mut Report) {
+    let cells: &[usize] = if all { &[14, 19, 27] } else { &[14, 19] };
+    cells.iter().for_each(|&cells| first_touch(&scenes::first_touch(cells), report));
+}
+
+/// Of 1024 and 2116 nodes below.
+pub fn slabs(report: &mut Report) {
+    [31, 45].iter().for_each(|&across| first_touch(&scenes::slab(across), report));
+}
+
+fn first_touch(scene: &Scene, report: &mut Report) {
+    for engine in Engine::BOTH {
+        let run = engines::run(engine, scene);
+        // It falls for a quarter of a second, with a second for what follows; the first step makes the factor.
+        let around = &run.times[1..run.times.len().min(75)];
+        let (at, worst) = around.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).expect("steps");
+        let touch = worst / last_second(scene, &run.times);
+        let mut also = format!(
+            "inserted in {} ms, first step {} ms, worst then {} ms at step {}, {touch:.1} × rest",
+            brief(run.insertion),
+            brief(run.times[0]),
+            brief(*worst),
+            at + 2
+        );
+        if engine == Engine::Foible {
+            let mb = |bytes: usize| brief(bytes as f64 * 1e-6);
+            let twice = run.peak as f64 / (2 * (run.factor + run.state)) as f64;
+            also += &format!(
+                "; factor {} MB, columns {} MB, state {} MB, peak {twice:.2} × twice factor and state",
+                mb(run.factor),
+                mb(run.columns),
+                mb(run.state)
+            );
+            if settled(scene, &run.times).is_some() {
+                report.measure(&scene.name, TOUCH, touch);
+            }
+            report.measure(&scene.name, BYTES, twice);
+            report.worst_steps(&scene.name, &run, 3);
+        }
+        report.line(scene, engine, &run, &also);
+    }
+}
+
+pub fn variable_steps(report: &mut Report) {
+    for swings in [true, false] {
+        for engine in Engine::BOTH {
+            let mut constant = f64::NAN;
+            for lengths in [Steps::Constant, Steps::Two, Steps::Any] {
+                let scene = scenes::variable_step(swings, lengths);
+                let run = engines::run(engine, &scene);
+                let mean = Times::of(&run.times).mean;
+                if matches!(lengths, Steps::Constant) {
+                    constant = mean;
+                    report.line(&scene, engine, &run, "");
+                    continue;
+                }
+                let ratio = mean / constant;
+                report.line(&scene, engine, &run, &format!("mean {ratio:.2} × that of 1/60 s"));
+                if engine == Engine::Foible {
+                    report.measure(&scene.name, TO_CONSTANT, ratio);
+                    report.worst_steps(&scene.name, &run, 1);
+                }
+            }
+        }
+    }
+}
+
+pub fn rollback(report: &mut Report) {
+    let scene = rollback::scene();
+    for engine in Engine::BOTH {
+        let found = rollback::run(engine, &scene);
+        report.line(&scene, engine, &found.run, &found.text());
+        if engine == Engine::Foible {
+            report.measure(&scene.name, AGAIN, found.ratio());
+            report.measure(&scene.name, LATE, found.late_ratio());
+            report.worst_steps(&scene.name, &found.run, 5);
+            assert!(found.same_bits, "frames computed again have other bits");
+        }
+    }
+}
+
+pub fn level(report: &mut Report) {
+    let scene = level::scene();
+    let runs = both(&scene);
+    let ratios = compare(&scene, &runs, report);
+    let slept = |run: &Run| match run.asleep {
+        Some(time) => format!("all but the flag sleep after {time:.1} s"),
+        None => format!("**{} bodies awake at the end**", run.awake),
+    };
+    let [ours, theirs] = &runs;
+    report.measure(&scene.name, ASLEEP, ours.asleep.unwrap_or(f64::INFINITY));
+    report.line(&scene, Engine::Foible, ours, &format!("{ratios}; {}", slept(ours)));
+    report.line(&scene, Engine::Rapier, theirs, &slept(theirs));
+    report.worst_steps(&scene.name, ours, 8);
+}
+
+/// All steps of all scenes in one line, with the scenes whose worst step is furthest from their median.
+pub fn random_scenes(count: u64, cap: f64, report: &mut Report) {
+    for engine in Engine::BOTH {
+        let mut whole = Run { finite: true, ..Run::default() };
+        let (mut scenes, mut cut) = (Vec::new(), 0);
+        for seed in 0..count {
+            let scene = random::scene(seed);
+            let run = engines::run(engine, &scene);
+            if !run.finite {
+                println!("random scene {seed} did not end finite in {}", engine.name());
+            }
+            whole.finite &= run.finite;
+            cut += u32::from(run.times.len() < scene.steps);
+            whole.times.extend(&run.times);
+            let times = Times::of(&run.times);
+            scenes.push((times.worst / times.median, seed, run));
+            if whole.times.iter().sum::<f64>() * 1e-3 > cap {
+                break;
+            }
+        }
+        scenes.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let typical = scenes[scenes.len() / 2].0;
+        let five = || scenes.iter().take(5);
+        let worst: Vec<String> = five().map(|(ratio, seed, _)| format!("{ratio:.0} (seed {seed})")).collect();
+        let also = format!(
+            "{} scenes, {cut} cut short; worst over median {typical:.0} in half of them, at most {}",
+            scenes.len(),
+            worst.join(", ")
+        );
+        // Of no length of its own: many scenes have no last second.
+        let name = format!("{count} random scenes");
+        if engine == Engine::Foible {
+            report.measure(&name, TYPICAL, typical);
+            report.measure(&name, EXTREME, scenes[0].0);
+            five().for_each(|(_, seed, run)| report.worst_steps(&format!("random {seed}"), run, 2));
+        }
+        let scene = Scene { steps: 0, ..Scene::new(name, Vec::new(), Vec::new()) };
+        report.line(&scene, engine, &whole, &also);
+    }
+}
