@@ -22,6 +22,10 @@ fn compare(scene: &Scene, [ours, theirs]: &[Run; 2], report: &mut Report) -> Str
     format!("{mean:.2} × rapier's mean, {median:.2} × median, {p99:.2} × 99 %, {worst:.2} × worst")
 }
 
+fn deep(run: &Run) -> String {
+    format!("{:.1e} m deep in something rigid", run.deepest)
+}
+
 pub fn heaps(all: bool, report: &mut Report) {
     let counts: &[usize] = if all { &[16, 48, 100, 200] } else { &[16, 48] };
     for &count in counts {
@@ -29,29 +33,29 @@ pub fn heaps(all: bool, report: &mut Report) {
         let runs = both(&scene);
         let ratios = compare(&scene, &runs, report);
         let [ours, theirs] = &runs;
-        let deep = |run: &Run| format!("{:.1e} m deep in floor or wall", run.deepest);
         report.line(&scene, Engine::Foible, ours, &format!("{ratios}; {}", deep(ours)));
         report.line(&scene, Engine::Rapier, theirs, &deep(theirs));
         report.worst_steps(&scene.name, ours, 3);
-        sleep(count, Times::of(&ours.times).worst, report);
+        sleep(count, ours, report);
     }
 }
 
-/// The same heap, allowed to sleep: what it takes just before it does, or at the end.
-fn sleep(count: usize, worst: f64, report: &mut Report) {
-    let scene = Scene { name: format!("heap of {count} cubes, may sleep"), ..scenes::sleeping_heap(count) };
-    let run = engines::run(Engine::Foible, &scene);
-    // The step in which it falls asleep is the last one.
-    let settled = last_second(&scene, &run.times);
+/// The same heap, allowed to sleep. What it takes when settled is the median of the last second of the longer of the two
+/// runs: small heaps sleep before they could show it, big ones settle later than the run that never sleeps.
+fn sleep(count: usize, awake: &Run, report: &mut Report) {
     let name = format!("heap of {count} cubes");
+    let scene = Scene { name: format!("{name}, may sleep"), ..scenes::sleeping_heap(count) };
+    let run = engines::run(Engine::Foible, &scene);
+    let longer = if run.times.len() > awake.times.len() { &run } else { awake };
+    let settled = last_second(&scene, &longer.times);
     report.measure(&name, ASLEEP, run.asleep.unwrap_or(f64::INFINITY));
-    let to_settled = report.measure(&name, WORST_TO_SETTLED, worst / settled);
+    let ratio = report.measure(&name, WORST_TO_SETTLED, Times::of(&awake.times).worst / settled);
     let slept = match run.asleep {
         Some(time) => format!("sleeps after {time:.1} s"),
         None => format!("**{} awake at the end**", run.awake),
     };
     let also = format!(
-        "{slept}; last second {} ms, {} per body; worst of its fall {to_settled:.1} × that",
+        "{slept}; settled {} ms, {} per body; worst of the fall {ratio:.1} × that",
         brief(settled),
         brief(settled / count as f64),
     );
@@ -90,36 +94,45 @@ pub fn slabs(report: &mut Report) {
 }
 
 fn first_touch(scene: &Scene, report: &mut Report) {
-    for engine in Engine::BOTH {
-        let run = engines::run(engine, scene);
-        // It falls for a quarter of a second, with a second for what follows; the first step makes the factor.
-        let around = &run.times[1..run.times.len().min(75)];
-        let (at, worst) = around.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).expect("steps");
-        let touch = worst / last_second(scene, &run.times);
-        let mut also = format!(
-            "inserted in {} ms, first step {} ms, worst then {} ms at step {}, {touch:.1} × rest",
-            brief(run.insertion),
-            brief(run.times[0]),
-            brief(*worst),
-            at + 2
-        );
-        if engine == Engine::Foible {
-            let mb = |bytes: usize| brief(bytes as f64 * 1e-6);
-            let twice = run.peak as f64 / (2 * (run.factor + run.state)) as f64;
-            also += &format!(
-                "; factor {} MB, columns {} MB, state {} MB, peak {twice:.2} × twice factor and state",
-                mb(run.factor),
-                mb(run.columns),
-                mb(run.state)
-            );
-            if settled(scene, &run.times).is_some() {
-                report.measure(&scene.name, TOUCH, touch);
-            }
-            report.measure(&scene.name, BYTES, twice);
-            report.worst_steps(&scene.name, &run, 3);
-        }
-        report.line(scene, engine, &run, &also);
+    let runs = both(scene);
+    let ratios = compare(scene, &runs, report);
+    let [ours, theirs] = &runs;
+    let ours_also = format!("{}; {ratios}; {}", touch(scene, ours), memory(scene, ours, report));
+    report.line(scene, Engine::Foible, ours, &ours_also);
+    report.line(scene, Engine::Rapier, theirs, &touch(scene, theirs));
+    if settled(scene, &ours.times).is_some() {
+        report.measure(&scene.name, TOUCH, touch_step(ours).1 / last_second(scene, &ours.times));
     }
+    report.worst_steps(&scene.name, ours, 3);
+}
+
+/// The worst step after the first, which makes the factor: which, and \[ms\].
+fn touch_step(run: &Run) -> (usize, f64) {
+    // It falls for a quarter of a second, with a second for what follows.
+    let around = run.times[..run.times.len().min(75)].iter().enumerate().skip(1);
+    let (at, worst) = around.max_by(|a, b| a.1.total_cmp(b.1)).expect("steps");
+    (at + 1, *worst)
+}
+
+fn touch(scene: &Scene, run: &Run) -> String {
+    let (at, worst) = touch_step(run);
+    format!(
+        "inserted in {} ms, first step {} ms, worst then {} ms at step {at}, {:.1} × rest",
+        brief(run.insertion),
+        brief(run.times[0]),
+        brief(worst),
+        worst / last_second(scene, &run.times)
+    )
+}
+
+fn memory(scene: &Scene, run: &Run, report: &mut Report) -> String {
+    let mb = |bytes: usize| brief(bytes as f64 * 1e-6);
+    let twice = run.peak as f64 / (2 * (run.factor + run.state)) as f64;
+    report.measure(&scene.name, BYTES, twice);
+    let [factor, columns, state] = [run.factor, run.columns, run.state].map(mb);
+    format!(
+        "factor {factor} MB, columns {columns} MB, state {state} MB, peak {twice:.2} × twice factor and state"
+    )
 }
 
 pub fn variable_steps(report: &mut Report) {
@@ -155,6 +168,7 @@ pub fn rollback(report: &mut Report) {
             report.measure(&scene.name, AGAIN, found.ratio());
             report.measure(&scene.name, LATE, found.late_ratio());
             report.worst_steps(&scene.name, &found.run, 5);
+            report.worst_steps("after a late input", &found.late_frames, 5);
             assert!(found.same_bits, "frames computed again have other bits");
         }
     }
@@ -170,8 +184,8 @@ pub fn level(report: &mut Report) {
     };
     let [ours, theirs] = &runs;
     report.measure(&scene.name, ASLEEP, ours.asleep.unwrap_or(f64::INFINITY));
-    report.line(&scene, Engine::Foible, ours, &format!("{ratios}; {}", slept(ours)));
-    report.line(&scene, Engine::Rapier, theirs, &slept(theirs));
+    report.line(&scene, Engine::Foible, ours, &format!("{ratios}; {}; {}", slept(ours), deep(ours)));
+    report.line(&scene, Engine::Rapier, theirs, &format!("{}; {}", slept(theirs), deep(theirs)));
     report.worst_steps(&scene.name, ours, 8);
 }
 

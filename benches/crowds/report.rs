@@ -76,6 +76,7 @@ impl Report {
         let early = done < of && run.asleep.is_none();
         let steps = if early { format!("**{done} of {of}**") } else { format!("{done}") };
         let unsound = if run.finite { "" } else { " NOT FINITE" };
+        let also = &format!("{also}{}", rejected(run));
         let columns = [mean, median, p99, worst].map(brief).join(" | ");
         println!("| {name} | {engine_name} | {columns} | {shown} | {steps} | {also}{unsound} |");
         let settled = settled.unwrap_or(f64::NAN);
@@ -121,6 +122,16 @@ impl Report {
             Ok(()) => println!("written: {path}"),
             Err(error) => eprintln!("{path}: {error}"),
         }
+    }
+}
+
+/// Steps of ours that were not taken as they would have made energy.
+fn rejected(run: &Run) -> String {
+    let of = |counters: &[DeformableCounters]| counters.iter().filter(|c| c.rejected_steps > 0).count();
+    let late = run.counters.len().saturating_sub(60);
+    match of(&run.counters) {
+        0 => String::new(),
+        all => format!("; {all} steps rejected, {} of the last 60", of(&run.counters[late..])),
     }
 }
 

@@ -128,6 +128,8 @@ pub struct Rollbacks {
     pub again: Vec<f64>,
     /// The same where an input came late: a box is pushed sideways in the first of the frames.
     pub late: Vec<f64>,
+    /// The frames after such an input.
+    pub late_frames: Run,
     /// Taking a snapshot \[ms\].
     pub saving: f64,
     pub same_bits: bool,
@@ -140,6 +142,7 @@ pub fn run(engine: Engine, scene: &Scene) -> Rollbacks {
         settled: 0.0,
         again: Vec::new(),
         late: Vec::new(),
+        late_frames: Run::default(),
         saving: 0.0,
         same_bits: true,
     };
@@ -156,19 +159,19 @@ pub fn run(engine: Engine, scene: &Scene) -> Rollbacks {
         });
         found.again.push(time);
         found.same_bits &= world.bits() == expected;
-        found.late.push(with_late_input(&mut world, late));
+        found.late.push(with_late_input(&mut world, late, &mut found.late_frames));
         world.restore(here);
     }
     found
 }
 
 /// Restores a frame and computes on from there with a box pushed sideways \[ms\].
-fn with_late_input(world: &mut World, from: Snapshot) -> f64 {
+fn with_late_input(world: &mut World, from: Snapshot, frames: &mut Run) -> f64 {
     let ((), time) = timed(|| {
         world.restore(from);
         let last = world.rigid[world.rigid.len() - 1];
         world.physics.bodies[last].apply_impulse(Vector::X * 0.3, true);
-        step(world, FRAMES, None);
+        step(world, FRAMES, Some(frames));
     });
     time
 }
