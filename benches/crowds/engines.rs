@@ -32,8 +32,8 @@ pub struct Run {
     pub counters: Vec<DeformableCounters>,
     /// Building and inserting the bodies \[ms\].
     pub insertion: f64,
-    /// Deepest place of a node in a rigid shape, at the end of any step \[m\].
-    pub deepest: f64,
+    /// Deepest place of a node in a rigid shape, after any step and after the last \[m\].
+    pub deepest: [f64; 2],
     /// Least volume of all solids over the one at rest, and that at the end.
     pub volume: [f64; 2],
     /// Largest ever \[bytes\].
@@ -124,12 +124,13 @@ impl Run {
         let now: f64 = solids.map(|(mesh, at)| volume(mesh, at)).sum();
         self.volume = [self.volume[0].min(now / rest), now / rest];
         let nodes = || seen.bodies.iter().flatten();
-        self.deepest = self.deepest.max(stage.deepest(nodes()));
+        let deep = stage.deepest(nodes());
+        self.deepest = [self.deepest[0].max(deep), deep];
         self.finite = nodes().all(|p| p.is_finite());
         self.awake = seen.awake + stage.awake_rigid();
         let now: f64 = (0..self.times.len()).map(|k| f64::from(scene.dt(k))).sum();
         // From then on to the end.
-        self.asleep = if self.awake == 0 { self.asleep.or(Some(now)) } else { None };
+        self.asleep = if scene.sleeps && self.awake == 0 { self.asleep.or(Some(now)) } else { None };
     }
 
     /// Steps to the end of the scene or of its time, or until all sleep that may.

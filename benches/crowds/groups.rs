@@ -23,7 +23,8 @@ fn compare(scene: &Scene, [ours, theirs]: &[Run; 2], report: &mut Report) -> Str
 }
 
 fn deep(run: &Run) -> String {
-    format!("{:.1e} m deep in something rigid", run.deepest)
+    let [ever, end] = run.deepest;
+    format!("{ever:.1e} m deep in something rigid, {end:.1e} at the end")
 }
 
 pub fn heaps(all: bool, report: &mut Report) {
@@ -69,11 +70,11 @@ pub fn pinch(report: &mut Report) {
         let before = Times::of(&run.times[scenes::PINCH_OUT / 2..scenes::PINCH_OUT]).median;
         let touched = Times::of(&run.times[scenes::PINCH_OUT..]).worst / before;
         let also = format!(
-            "{} ms before, worst {touched:.0} ×; volume {:.2}, {:.4} at the end; {:.1e} m deep",
+            "{} ms before, worst {touched:.0} ×; volume {:.2}, {:.4} at the end; {}",
             brief(before),
             run.volume[0],
             run.volume[1],
-            run.deepest
+            deep(&run)
         );
         report.line(&scene, engine, &run, &also);
         if engine == Engine::Foible {
@@ -193,7 +194,7 @@ pub fn level(report: &mut Report) {
 pub fn random_scenes(count: u64, cap: f64, report: &mut Report) {
     for engine in Engine::BOTH {
         let mut whole = Run { finite: true, ..Run::default() };
-        let (mut scenes, mut cut) = (Vec::new(), 0);
+        let (mut scenes, mut cut) = (Vec::new(), Vec::new());
         for seed in 0..count {
             let scene = random::scene(seed);
             let run = engines::run(engine, &scene);
@@ -201,7 +202,7 @@ pub fn random_scenes(count: u64, cap: f64, report: &mut Report) {
                 println!("random scene {seed} did not end finite in {}", engine.name());
             }
             whole.finite &= run.finite;
-            cut += u32::from(run.times.len() < scene.steps);
+            cut.extend((run.times.len() < scene.steps).then_some(seed));
             whole.times.extend(&run.times);
             let times = Times::of(&run.times);
             scenes.push((times.worst / times.median, seed, run));
@@ -214,7 +215,7 @@ pub fn random_scenes(count: u64, cap: f64, report: &mut Report) {
         let five = || scenes.iter().take(5);
         let worst: Vec<String> = five().map(|(ratio, seed, _)| format!("{ratio:.0} (seed {seed})")).collect();
         let also = format!(
-            "{} scenes, {cut} cut short; worst over median {typical:.0} in half of them, at most {}",
+            "{} scenes, cut short {cut:?}; worst over median {typical:.0} in half of them, at most {}",
             scenes.len(),
             worst.join(", ")
         );

@@ -71,7 +71,7 @@ pub fn first_touch(cells: usize) -> Scene {
     let mesh = cube(0.2, [cells; 3]);
     let name = format!("first touch, {} tets", mesh.tetrahedra().len());
     let soft = Soft::new(&mesh, Pose::from_translation(Vector::Y * 0.5));
-    Scene { steps: 120, prepared: false, cap: 20.0, ..Scene::new(name, vec![soft], vec![floor()]) }
+    Scene { steps: 120, prepared: false, ..Scene::new(name, vec![soft], vec![floor()]) }
 }
 
 /// A slab of cells of 2 cm, so many across and two high, dropped flat by 0.3 m, nothing made ahead: all of its lower
@@ -83,7 +83,7 @@ pub fn slab(across: usize) -> Scene {
     let mesh = Arc::new(TetMesh::cuboid(half, [across, HIGH, across]).expect("a valid lattice"));
     let name = format!("slab of {} contacts, {} tets", (across + 1).pow(2), mesh.tetrahedra().len());
     let soft = Soft::new(&mesh, Pose::from_translation(Vector::Y * (0.3 + half[1] as f32)));
-    Scene { steps: 120, prepared: false, cap: 20.0, ..Scene::new(name, vec![soft], vec![floor()]) }
+    Scene { steps: 120, prepared: false, ..Scene::new(name, vec![soft], vec![floor()]) }
 }
 
 /// How long the steps of a scene are.
