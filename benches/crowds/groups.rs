@@ -118,11 +118,12 @@ fn touch_step(run: &Run) -> (usize, f64) {
 fn touch(scene: &Scene, run: &Run) -> String {
     let (at, worst) = touch_step(run);
     format!(
-        "inserted in {} ms, first step {} ms, worst then {} ms at step {at}, {:.1} × rest",
+        "inserted in {} ms, first step {} ms, worst then {} ms at step {at}, {:.1} × rest; {}",
         brief(run.insertion),
         brief(run.times[0]),
         brief(worst),
-        worst / last_second(scene, &run.times)
+        worst / last_second(scene, &run.times),
+        deep(run)
     )
 }
 
