@@ -111,7 +111,7 @@ impl Report {
     }
 
     pub fn write(&self) {
-        println!("\nOur worst steps, times in ms:\n");
+        println!("\nOur worst steps; ms, those of their parts by the clock on the wall:\n");
         println!(
             "| scene | step | time | contacts | carry | Newton | factored | products | error | failed | iterations | rejected | sparse \
              factors | columns | factors | detection | solve | contact |"
