@@ -10,7 +10,7 @@ use rapier3d::prelude::*;
 fn heap(budget: usize) -> (f64, f64, usize, f64) {
     let (mut physics, _) = world_with_floor(1.0 / 60.0);
     let mut world = DeformableWorld::new();
-    world.parameters = DeformableParameters::default().contact_products(budget);
+    world.parameters = DeformableParameters::default().contact_iterations(budget);
     for k in 0..8u8 {
         let place = Vector::new(0.1 * f32::from(k % 2), 0.2 + 0.3 * f32::from(k), 0.08 * f32::from(k % 3));
         let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2, 2, 2]).translation(place);

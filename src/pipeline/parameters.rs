@@ -28,10 +28,10 @@ pub struct DeformableParameters {
     /// counted from the touched ones outward. Zero leaves these to rapier alone: its contacts are springs
     /// that give way under loads many times the body's own weight.
     pub neighbourhood_bodies: usize,
-    /// Work on the contacts of a crowd, per island and step: products with the Delassus operator, each about a solve of
-    /// all of its bodies; a counted number, so that results do not depend on the machine. What it leaves is overlap,
-    /// which the next steps take up from there.
-    pub contact_products: usize,
+    /// Iterations over the contacts of an island in a step: sweeps, or half as many products with the Delassus operator. A
+    /// counted number, so that results do not depend on the machine. What it leaves is overlap, which the next steps take
+    /// up from there.
+    pub contact_iterations: usize,
     /// Memory \[bytes\] for columns of inverses, kept between steps for contacts.
     pub column_budget: usize,
 }
@@ -43,7 +43,7 @@ impl Default for DeformableParameters {
             max_corrective_velocity: 1.0,
             restitution_threshold: 0.5,
             neighbourhood_bodies: 64,
-            contact_products: 60,
+            contact_iterations: 150,
             column_budget: 512 << 20,
         }
     }
@@ -74,10 +74,10 @@ impl DeformableParameters {
         Self { neighbourhood_bodies, ..self }
     }
 
-    /// Sets the work on the contacts of a crowd.
+    /// Sets the iterations over the contacts of an island in a step.
     #[must_use]
-    pub fn contact_products(self, contact_products: usize) -> Self {
-        Self { contact_products, ..self }
+    pub fn contact_iterations(self, contact_iterations: usize) -> Self {
+        Self { contact_iterations, ..self }
     }
 
     /// Sets the memory \[bytes\] for columns of inverses.
@@ -92,7 +92,7 @@ impl DeformableParameters {
             restitution_threshold: self.restitution_threshold.max(0.0),
             // Below 1e-12 there is only rounding; NaN becomes that too.
             tolerance: self.contact_tolerance.max(1e-12),
-            products: self.contact_products,
+            iterations: self.contact_iterations,
         }
     }
 }
@@ -131,11 +131,13 @@ pub struct DeformableCounters {
     pub solve_bytes: usize,
     /// Newton steps of the contact problems.
     pub newton_steps: usize,
-    /// Products with the Delassus operators of crowds.
+    /// Sweeps over the contacts of islands.
+    pub contact_sweeps: usize,
+    /// Products with the Delassus operators of islands in whose place there is no matrix.
     pub contact_products: usize,
-    /// Islands whose contacts took all of [`DeformableParameters::contact_products`].
+    /// Islands whose contacts took all of [`DeformableParameters::contact_iterations`].
     pub budgets_reached: usize,
-    /// Largest relative error of contact forces that a crowd was left with.
+    /// Largest relative error of contact forces that an island was left with.
     pub contact_error: f64,
     /// Dense factorizations of the contact problems.
     pub contact_factorizations: usize,
@@ -174,6 +176,7 @@ pub struct DeformableCounters {
 impl DeformableCounters {
     pub(super) fn add(&mut self, report: &IslandReport) {
         self.iterations += report.iterations;
+        self.contact_sweeps += report.contacts.sweeps;
         self.contact_products += report.contacts.products;
         self.budgets_reached += usize::from(report.contacts.is_exhausted);
         self.contact_error = self.contact_error.max(report.contacts.error);

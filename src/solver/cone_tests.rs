@@ -4,7 +4,7 @@
 //! variational inequalities of P and of the solution λ* sum to `eᵀWe ≤ eᵀ(W + D)r` for `e = λ − λ*`, so
 //! `‖e‖ ≤ (W_max + R_max)/W_min ‖r‖`, the extremes of eigenvalues.
 
-use super::cone::{ConeProblem, ConeSolver, ConeTolerance, ConeWork, Newton, project, spatial};
+use super::cone::{ConeProblem, ConeSolver, ConeTolerance, ConeWork, Effort, project, spatial};
 use super::linear::BlockMatrix;
 use crate::contact::Law;
 use nalgebra::{DMatrix, DVector};
@@ -180,9 +180,9 @@ fn regularised(problem: &ConeProblem, W: &DMatrix<f64>) -> (Vec<f64>, Vec<f64>) 
 fn solve(problem: &ConeProblem, solver: &mut ConeSolver, start: &[f64]) -> (Vec<f64>, ConeWork) {
     let (mut lambda, mut product) = (start.to_vec(), Vec::new());
     problem.multiply(&lambda, &mut product);
-    let first = solver.solve(problem, &mut lambda, &mut product, TOLERANCE, Newton::FULL);
+    let first = solver.solve(problem, &mut lambda, &mut product, TOLERANCE, Effort::Full);
     for _ in 0..60 {
-        solver.solve(problem, &mut lambda, &mut product, TOLERANCE, Newton::FULL);
+        solver.solve(problem, &mut lambda, &mut product, TOLERANCE, Effort::Full);
     }
     (lambda, first)
 }
@@ -192,7 +192,7 @@ fn solve_once(problem: &ConeProblem, solver: &mut ConeSolver, start: &[f64]) -> 
     let (mut lambda, mut product) = (start.to_vec(), Vec::new());
     problem.multiply(&lambda, &mut product);
     let tolerance = ConeTolerance { relative: 1e-9, floor: 1e-6 };
-    let work = solver.solve(problem, &mut lambda, &mut product, tolerance, Newton::FULL);
+    let work = solver.solve(problem, &mut lambda, &mut product, tolerance, Effort::Full);
     (lambda, work)
 }
 
@@ -315,7 +315,7 @@ proptest! {
         let (R, by_row) = regularised(problem, &case.W);
         let mut solver = ConeSolver::default();
         solver.predict(problem, &case.points(), &vec![0.0; problem.contacts()], |_| 0.1);
-        let work = solver.solve(problem, &mut lambda, &mut product, TOLERANCE, Newton::FULL);
+        let work = solver.solve(problem, &mut lambda, &mut product, TOLERANCE, Effort::Full);
         // The warm start has done it: with continuation it would be a predictor step, and at least one step for each of its ends.
         prop_assume!(work.newton_steps <= 2);
         // λ = P(λ⁰ − (g + Wλ)/R).

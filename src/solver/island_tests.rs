@@ -13,7 +13,7 @@ use crate::fem::SystemMatrix;
 use crate::math::{Mat3, Vec3};
 
 pub(super) const LIMITS: ContactLimits =
-    ContactLimits { recovery_speed: 1.0, restitution_threshold: 0.5, tolerance: 1e-12, products: 60 };
+    ContactLimits { recovery_speed: 1.0, restitution_threshold: 0.5, tolerance: 1e-12, iterations: 60 };
 
 /// A bent body with contacts at its lowest nodes.
 pub(super) fn touching() -> (FactorCache, Island) {

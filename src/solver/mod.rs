@@ -24,6 +24,8 @@ mod gradient_tests;
 #[cfg(test)]
 mod island_tests;
 #[cfg(test)]
+mod sweep_tests;
+#[cfg(test)]
 mod tests;
 
 pub(crate) use body_step::{BodyProblem, SECOND_ORDER};

@@ -1,7 +1,7 @@
 //! The solver against dense and brute-force twins.
 
 use super::body_step::BodyProblem;
-use super::cone::{ConeProblem, ConeSolver, ConeTolerance, Newton, project};
+use super::cone::{ConeProblem, ConeSolver, ConeTolerance, Effort, project};
 use super::linear::{
     BlockMatrix, ConjugateScratch, FactorCache, FactorKey, FactorScratch, StiffnessOperator, SystemFactor,
     assemble, pattern_of,
@@ -311,7 +311,7 @@ proptest! {
         let mut product = lambda.clone();
         // Outer proximal iterations: at the fixed point the regularisation cancels.
         for _ in 0..200 {
-            solver.solve(&problem, &mut lambda, &mut product, ConeTolerance { relative: 1e-12, floor: 1e-9 }, Newton::FULL);
+            solver.solve(&problem, &mut lambda, &mut product, ConeTolerance { relative: 1e-12, floor: 1e-9 }, Effort::Full);
         }
         for i in 0..contacts {
             prop_assert!(lambda[3 * i + 1].hypot(lambda[3 * i + 2]) <= mu * lambda[3 * i] + 1e-9);

@@ -76,7 +76,7 @@ impl NewtonFactors {
         let (factor, coarse) = [false, true].into_iter().find_map(|projected| {
             let (x, pins) = (&body.current.x, &body.key.pins);
             let values = assemble_tangent(&body.elements(), x, projected, pins, body.h(), symbolic);
-            let coarse = CoarseInverse::new(&body.model, pins, symbolic, &values);
+            let coarse = CoarseInverse::local(pins, symbolic, &values);
             Some((symbolic.factorize(&values, &mut self.scratch).ok()?, coarse))
         })?;
         let surface = &body.model.surface;

@@ -7,6 +7,7 @@
 use super::metric::{ConeMetric, MetricContact, Modes, STILL, dot_modes, norm_squared};
 use super::problem::dot;
 use super::projection;
+use super::secant;
 use crate::math::lanes::Lane;
 use crate::math::vectorized;
 use crate::solver::linear::{BlockFactor, MODES};
@@ -184,9 +185,8 @@ fn slope[](
 }
 
 impl CoarseNewton {
-    /// Writes the change d of the forces, and `V p`, which is `V Vᵀd` as far as that is solved; returns the Newton steps
-    /// that it took.
-    pub fn solve(&mut self, problem: &CoarseProblem<'_>, [d, Vp]: [&mut Vec<f64>; 2]) -> usize {
+    /// Writes the change d of the forces, and `V p`, which is `V Vᵀd` as far as that is solved.
+    pub fn solve(&mut self, problem: &CoarseProblem<'_>, [d, Vp]: [&mut Vec<f64>; 2]) {
         let bodies = problem.metric.bodies;
         self.p.clear();
         self.p.resize(bodies, STILL);
@@ -198,7 +198,7 @@ impl CoarseNewton {
                 wanted = INEXACTNESS * norm;
             }
             if step == STEPS || !(norm > wanted) || !self.factorize(problem) {
-                return step;
+                return;
             }
             self.solved.clear();
             self.solved.extend(self.gradient.iter().flatten().flat_map(|lane| lane.0.map(|g| -g)));
@@ -213,7 +213,6 @@ impl CoarseNewton {
                 *p = std::array::from_fn(|k| dp[k].mul_add(Lane::splat(t), p[k]));
             }
         }
-        STEPS
     }
 
     fn factorize(&mut self, problem: &CoarseProblem<'_>) -> bool {
@@ -236,23 +235,10 @@ impl CoarseNewton {
         let slope = |t: f64| slope(problem, t, p, dp, u, du);
         let at_start = slope(0.0);
         let enough = 0.1 * at_start.abs();
-        let (mut low, mut f_low, mut high) = (0.0, at_start, 1.0);
-        let mut f_high = slope(high);
-        if !(at_start < 0.0 && f_high > enough) {
+        let at_one = slope(1.0);
+        if !(at_start < 0.0 && at_one > enough) {
             return 1.0;
         }
-        for _ in 0..TRIALS {
-            let t = low + (high - low) * (f_low / (f_low - f_high)).clamp(0.05, 0.95);
-            let f = slope(t);
-            if f.abs() <= enough {
-                return t;
-            }
-            if f < 0.0 {
-                (low, f_low) = (t, f);
-            } else {
-                (high, f_high) = (t, f);
-            }
-        }
-        low.max(1e-6)
+        secant::root(slope, [(0.0, at_start), (1.0, at_one)], enough, TRIALS)
     }
 }

@@ -14,12 +14,17 @@ mod coarse_newton;
 
 mod projected_gradient;
 
-pub(crate) use metric::{ConeMetric, MetricContact, MetricSide, Modes, STILL};
-pub(crate) use projected_gradient::{ConeOperator, GradientWork, ProjectedGradient};
+mod sweeps;
 
-pub(crate) use newton::{ConeSolver, Newton};
+mod secant;
+
+pub(crate) use metric::{ConeMetric, MetricContact, MetricSide, Modes, STILL};
+pub(crate) use projected_gradient::{ConeOperator, ProjectedGradient};
+
+pub(crate) use newton::{ConeSolver, Effort};
 #[cfg(test)]
 pub(in crate::solver) use problem::ConeWork;
 pub(crate) use problem::{ConeProblem, ConeTolerance};
+pub(crate) use sweeps::ConeSweeps;
 #[cfg(test)]
 pub(in crate::solver) use {problem::spatial, projection::project};

@@ -12,6 +12,7 @@
 use super::hessian::ConeHessian;
 use super::problem::{ConeProblem, ConeTolerance, ConeWork, dot, largest, spatial};
 use super::projection;
+use super::secant;
 use crate::contact::Law;
 
 /// Proximal parameter of the result.
@@ -29,27 +30,22 @@ const TOO_FAR: f64 = 0.2;
 const STAGE_TOLERANCE: f64 = 3.0e-3;
 /// Newton steps on a stage of the continuation.
 const STAGE_STEPS: usize = 40;
+/// The same where it is to end soon.
+const NEAR_STEPS: usize = 8;
+/// Secants of a line search.
+const SECANTS: usize = 30;
 /// Stages tried when warm start and short continuation failed.
 const FINE_STAGES: [f64; 7] = [1.0, 0.1, 1e-2, 3e-3, 1e-3, 3e-4, EPSILON];
 
-/// How a solve goes about it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Newton {
-    /// From the forces as they are first.
-    pub begins_warm: bool,
-    /// By continuation, if that fails or is not tried.
-    pub continues: bool,
-    /// What a failure has come to is kept: forces that their laws admit, but not accurate.
-    pub keeps_failures: bool,
-    /// Factorizations at the most, about.
-    pub limit: usize,
-}
-
-impl Newton {
-    pub const FULL: Self =
-        Self { begins_warm: true, continues: true, keeps_failures: true, limit: usize::MAX };
-    pub const WARM: Self = Self { continues: false, keeps_failures: false, ..Self::FULL };
-    pub const NEAR: Self = Self { begins_warm: false, keeps_failures: false, ..Self::FULL };
+/// How far a solve goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Effort {
+    /// From the forces as they are; they stay so where that fails.
+    Warm,
+    /// And by a short continuation; they stay as they are where that fails.
+    Near,
+    /// And by continuation. What a failure has come to is kept: forces that their laws admit, but not accurate.
+    Full,
 }
 
 /// Solves cone problems; holds the memory for them.
@@ -104,7 +100,7 @@ impl ConeSolver {
         lambda: &mut [f64],
         W_lambda: &mut Vec<f64>,
         tolerance: ConeTolerance,
-        newton: Newton,
+        effort: Effort,
     ) -> ConeWork {
         let mut work = ConeWork::default();
         if problem.contacts() == 0 {
@@ -121,7 +117,6 @@ impl ConeSolver {
             solver.center.extend_from_slice(lambda);
             solver.Wz.clone_from(W_lambda);
             stages.iter().all(|&(epsilon, steps)| {
-                let steps = steps.min(newton.limit.saturating_sub(work.factorizations));
                 // What is only a start for the next stage need not be more exact than that.
                 let relative = if epsilon > EPSILON { STAGE_TOLERANCE } else { tolerance.relative };
                 let tolerance = ConeTolerance { relative: relative.max(tolerance.relative), ..tolerance };
@@ -131,13 +126,15 @@ impl ConeSolver {
                 done
             })
         };
-        let done = newton.begins_warm && continuation(self, &[(EPSILON, WARM_STEPS)])
-            || newton.continues
+        let done = continuation(self, &[(EPSILON, WARM_STEPS)])
+            || effort == Effort::Near
+                && continuation(self, &[(3e-2, NEAR_STEPS), (1e-3, NEAR_STEPS), (EPSILON, NEAR_STEPS)])
+            || effort == Effort::Full
                 && (continuation(self, &[(3e-2, STAGE_STEPS), (1e-3, STAGE_STEPS), (EPSILON, STAGE_STEPS)])
                     || continuation(self, &FINE_STAGES.map(|e| (e, STAGE_STEPS))));
         if !done {
             work.failures += 1;
-            if !newton.keeps_failures || self.gamma.iter().any(|g| !g.is_finite()) {
+            if effort != Effort::Full || self.gamma.iter().any(|g| !g.is_finite()) {
                 return work;
             }
         }
@@ -380,19 +377,6 @@ impl ConeSolver {
         if f_high.abs() <= enough || f_high < 0.0 {
             return high;
         }
-        for _ in 0..30 {
-            // Secant, kept off the ends of the bracket.
-            let t = low + (high - low) * (f_low / (f_low - f_high)).clamp(0.05, 0.95);
-            let f = slope(t);
-            if f.abs() <= enough {
-                return t;
-            }
-            if f < 0.0 {
-                (low, f_low) = (t, f);
-            } else {
-                (high, f_high) = (t, f);
-            }
-        }
-        low.max(1e-6)
+        secant::root(slope, [(low, f_low), (high, f_high)], enough, SECANTS)
     }
 }

@@ -4,10 +4,10 @@ use super::elimination::Elimination;
 use super::rigid_proxy::{RigidProxies, RigidProxy};
 use crate::contact::{Constraint, Endpoint, ProxyId};
 use crate::math::lanes::Lane;
-use crate::math::{Mat3, Vec3, centre_of_mass, inertia_about, solve_semidefinite};
+use crate::math::{Mat3, Vec3};
 use crate::solver::body_step::{BodyProblem, Factors};
 use crate::solver::cone::{ConeMetric, MetricContact, MetricSide, Modes, STILL};
-use crate::solver::linear::MODES;
+use crate::solver::linear::{MODES, rigid_mobility};
 
 /// Memory for making a metric.
 #[derive(Default)]
@@ -168,12 +168,9 @@ fn rigid_shape(body: &BodyProblem) -> Option<RigidModes> {
     if !body.key.pins.is_empty() {
         return None;
     }
-    let (mass, centre) = centre_of_mass(&body.current.x, body.masses());
-    let inertia = inertia_about(&centre, &body.current.x, body.masses());
     let mobility = body.mobility() / body.step_damping;
-    let turned = [0, 1, 2].map(|c| solve_semidefinite(&inertia, &Vec3::ith(c, mobility)));
-    let linear = Vec3::repeat((mobility / mass).sqrt());
-    Some(RigidModes { centre, linear, angular: root(&Mat3::from_columns(&turned)) })
+    let (centre, by_force, by_moment) = rigid_mobility(&body.current.x, body.masses(), mobility);
+    Some(RigidModes { centre, linear: Vec3::repeat(by_force.sqrt()), angular: root(&by_moment) })
 }
 
 /// Of a link only what its own forces move.

@@ -22,6 +22,6 @@ pub(crate) struct ContactLimits {
     pub restitution_threshold: f64,
     /// Relative accuracy of the forces.
     pub tolerance: f64,
-    /// Products with W of crowds, per island and step.
-    pub products: usize,
+    /// Sweeps over the contacts, or products with W in their place, per island and step.
+    pub iterations: usize,
 }

@@ -116,8 +116,9 @@ enum JacobianColumn {
         nodes: [usize; 3],
         /// Their places on the surface.
         places: [usize; 3],
-        /// Directions by weights; in the frame of a body that has one frame.
-        directions: [Mat3; 3],
+        weights: [f64; 3],
+        /// Directions; in the frame of a body that has one frame.
+        directions: Mat3,
     },
     Rigid {
         proxy: ProxyId,
@@ -173,18 +174,18 @@ impl JacobianColumn {
 
     fn soft(body: usize, geometry: &ConstraintGeometry, k: usize, sign: f64, problem: &BodyProblem) -> Self {
         let frame = problem.preconditioner.one_frame().unwrap_or_else(Mat3::identity);
-        let turned =
+        let directions =
             frame.tr_mul(&Mat3::from_columns(&geometry.frame)) * (sign / problem.step_damping.sqrt());
-        let (mut count, mut nodes, mut places, mut directions) = (0, [0; 3], [0; 3], [Mat3::zeros(); 3]);
+        let (mut count, mut nodes, mut places, mut weights) = (0, [0; 3], [0; 3], [0.0; 3]);
         for (&node, &weight) in geometry.nodes[k].iter().zip(&geometry.weights[k]) {
             if weight != 0.0 {
                 nodes[count] = node as usize;
                 places[count] = problem.model.surface.index_of_node[node as usize] as usize;
-                directions[count] = turned * weight;
+                weights[count] = weight;
                 count += 1;
             }
         }
-        Self::Soft { body, count, nodes, places, directions }
+        Self::Soft { body, count, nodes, places, weights, directions }
     }
 }
 
@@ -207,31 +208,40 @@ impl Between<'_> {
         sum
     }
 
+    /// What two contacts have to do with one another through a soft body.
+    fn of_body(&self, index: usize, a: &JacobianColumn, b: &JacobianColumn) -> Mat3 {
+        let (
+            JacobianColumn::Soft { count: m, nodes, places, weights, directions, .. },
+            JacobianColumn::Soft {
+                count: n,
+                nodes: nodes_b,
+                places: places_b,
+                weights: weights_b,
+                directions: directions_b,
+                ..
+            },
+        ) = (a, b)
+        else {
+            return Mat3::zeros();
+        };
+        let body = &self.bodies[index];
+        let factor = self.factors.of(index, body);
+        let has_one_frame = body.preconditioner.one_frame().is_some();
+        let pairs = (0..*n).flat_map(|l| (0..*m).map(move |k| (k, l)));
+        let block = |(k, l): (usize, usize)| {
+            let mut block = factor.columns.block(places[k], places_b[l]);
+            if !has_one_frame {
+                block = body.preconditioner.compliance(factor, &block, nodes[k], nodes_b[l]);
+            }
+            block * (weights[k] * weights_b[l])
+        };
+        directions.tr_mul(&(pairs.map(block).sum::<Mat3>() * directions_b))
+    }
+
     fn add(&self, a: &JacobianColumn, b: &JacobianColumn, sum: &mut Mat3) {
         match (a, b) {
-            (
-                JacobianColumn::Soft { body: i, count: m, nodes, places, directions },
-                JacobianColumn::Soft {
-                    body: j,
-                    count: n,
-                    nodes: nodes_b,
-                    places: places_b,
-                    directions: directions_b,
-                },
-            ) if i == j => {
-                let body = &self.bodies[*i];
-                let factor = self.factors.of(*i, body);
-                let columns = &factor.columns;
-                let has_one_frame = body.preconditioner.one_frame().is_some();
-                for l in 0..*n {
-                    for k in 0..*m {
-                        let mut block = columns.block(places[k], places_b[l]);
-                        if !has_one_frame {
-                            block = body.preconditioner.compliance(factor, &block, nodes[k], nodes_b[l]);
-                        }
-                        *sum += directions[k].tr_mul(&(block * directions_b[l]));
-                    }
-                }
+            (JacobianColumn::Soft { body: i, .. }, JacobianColumn::Soft { body: j, .. }) if i == j => {
+                *sum += self.of_body(*i, a, b);
             }
             (
                 JacobianColumn::Rigid { proxy: i, wrenches, .. },

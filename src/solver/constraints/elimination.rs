@@ -4,7 +4,7 @@
 #[derive(Default)]
 pub(super) struct Elimination {
     /// Which blocks touch, row by row; with the fill once the order is there.
-    pub adjacent: Vec<bool>,
+    adjacent: Vec<bool>,
     /// Place of each block, and the block at each place.
     pub rank: Vec<usize>,
     pub order: Vec<usize>,

@@ -104,6 +104,14 @@ impl ContactGroups {
         };
         self.filled.chunk_by(|a, b| a.1 == b.1).map(column_work).sum()
     }
+
+    /// Multiplications and additions of one product, or sweep, about.
+    pub fn product_work(&self) -> usize {
+        let rows = |place: usize| 3 * self.sizes[self.elimination.order[place]];
+        let block_work =
+            |&(i, j): &(usize, usize)| if i == j { rows(i) * rows(i) } else { 2 * rows(i) * rows(j) };
+        self.coupled.iter().map(block_work).sum()
+    }
 }
 
 /// The two things that a constraint is between, as far as they yield.

@@ -1,36 +1,35 @@
-//! How contact forces are improved: by Newton's method where W is small or the forces nearly right, else by projected
-//! gradients that only multiply with W, as far as the step's budget goes.
+//! How contact forces are improved: with W as a matrix where the bodies' columns are there, by Newton's method or by
+//! sweeps over the contacts; else by projected gradients that only multiply with W.
 
-use super::coarse_space::CoarseParts;
 use super::context::SolveContext;
-use super::delassus::ContactRows;
-use super::gaps::{end, relative_motion};
-use super::matrix_free::MatrixFree;
-use super::system::{Change, ContactSystem};
-use crate::contact::Law;
+use super::gaps::relative_motion;
+use super::system::ContactSystem;
+use crate::contact::{Endpoint, Law};
 use crate::solver::body_step::{BodyProblem, Factors};
-use crate::solver::cone::{ConeTolerance, GradientWork, Newton};
+use crate::solver::cone::{ConeTolerance, Effort};
 
-/// Bodies of an island from which on it is a crowd: in heaps the worst step of Newton's method takes 200 ms with eight
-/// bodies and 2400 ms with 48. Fewer stand on one another in towers, which want its accuracy.
+/// Bodies of an island from which on it is a crowd: Newton's method does not climb its continuation there. Towers of
+/// fewer carry rigid loads, which sweeps do not.
 const CROWD: usize = 6;
-/// Operations of the factorizations of a small island in a step, at the most. A landing takes 1e7; what is crushed by a thousand
-/// times its mass at 1e3 Pa and 1/10 s takes 1.6e9, and at half of that ends below the floor.
-const SMALL_WORK: usize = 20_000_000_000;
-/// Error of a crowd's forces from which on Newton's method is tried.
-const NEARLY_STILL: f64 = 1.0e-2;
-/// Share of the budget that a factorization may take for Newton's method to be tried at all, and from near.
-const AFFORDABLE: [f64; 2] = [4.0, 0.05];
-/// Newton steps that this may take.
-const NEAR_STEPS: usize = 12;
-/// Solves with a fresh shift: of Newton's method, of projected gradients.
-const SHIFT_ROUNDS: [usize; 2] = [2, 4];
-/// Part of a new shift that is taken from the second round on: whole ones swing to and fro in an impact.
-const SHIFT_BLEND: f64 = 0.5;
-/// Products of one solve, at least and at the most.
-const PRODUCTS: [usize; 2] = [2, 10];
-/// Part of its first error that a solve leaves to the next outer iteration.
-const REDUCTION: f64 = 0.1;
+/// Operations of a small island's factorizations in a step, at the most, before sweeps take over: a millisecond or two.
+const LIGHT_WORK: usize = 20_000_000;
+/// The same of what is still, or has rigid loads. A landing takes 1e7; what a thousand times its mass crushes at 1e3 Pa and 1/10 s takes 1.6e9,
+/// and at half of that ends below the floor.
+const LOADED_WORK: usize = 20_000_000_000;
+/// The same of crowds that are still: some 20 ms.
+const STILL_WORK: usize = 2_000_000_000;
+/// Edges, per step, below which a body is still: what stands is to be solved to the last digit.
+const STILL: f64 = 0.01;
+/// Factorizations of a solve by continuation, about.
+const SOLVE: usize = 15;
+/// Newton's method is tried from the forces as they are where a factorization takes no more than so many iterations.
+const WARM_WORK: usize = 150;
+/// Tries of that in a step that may fail.
+const WARM_FAILURES: usize = 2;
+/// Error of the last sweep from which on it is tried again.
+const NEARLY_SOLVED: f64 = 1.0e-2;
+/// Overlap that sweeps may leave in a small island, in mean edges.
+const OVERLAP_LEFT: f64 = 0.05;
 
 /// What a solve is given.
 #[derive(Clone, Copy)]
@@ -38,14 +37,6 @@ pub(super) struct Around<'a> {
     pub factors: Factors<'a>,
     pub context: &'a SolveContext<'a>,
     pub tolerance: ConeTolerance,
-}
-
-/// How far one solve by projected gradients goes.
-#[derive(Clone, Copy)]
-struct Aim {
-    error: f64,
-    products: usize,
-    blend: f64,
 }
 
 impl ContactSystem {
@@ -63,111 +54,75 @@ impl ContactSystem {
         }
         let around = Around { factors, context, tolerance };
         self.measure(bodies, context);
-        let has_columns = bodies.iter().enumerate().all(|(i, b)| factors.has_columns(i, b));
-        let is_small = bodies.len() < CROWD && self.spent.operations < SMALL_WORK;
-        if is_small && has_columns {
-            return self.solve_small(bodies, around);
+        if !bodies.iter().enumerate().all(|(i, b)| factors.has_columns(i, b)) {
+            return self.improve_without_matrix(bodies, around);
         }
-        self.improve_crowd(bodies, around, has_columns)
-    }
-
-    /// Newton's method, with whatever it comes to.
-    fn solve_small(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) -> bool {
-        let before = self.work.factorizations;
-        let changed = self.solve_densely(bodies, around, Newton::FULL);
-        self.spent.operations += (self.work.factorizations - before) * self.groups.factor_work();
-        changed.unwrap_or(false)
-    }
-
-    /// Projected gradients, and Newton's method where that is cheap or nearly done.
-    fn improve_crowd(&mut self, bodies: &mut [BodyProblem], around: Around<'_>, may_factorize: bool) -> bool {
-        self.update_metric(bodies, around);
-        self.set_gradient(around.tolerance);
-        let budget = around.context.limits.products as f64;
-        let factorization = self.groups.factor_work() as f64 / self.product_work(bodies, around.factors);
-        let [affordable, cheap] = AFFORDABLE.map(|share| may_factorize && factorization <= share * budget);
-        let tries_newton = affordable && (cheap || self.work.error <= NEARLY_STILL) && !self.dense.has_failed;
-        if tries_newton
-            && let Some(changed) = self.spend_on_newton(bodies, around, Newton::WARM, factorization)
-        {
+        let is_small = bodies.len() < CROWD;
+        let is_still = self.is_still(bodies, context.h);
+        let work = if is_still || self.has_loads(context) { LOADED_WORK } else { LIGHT_WORK };
+        let solve = SOLVE * self.groups.factor_work();
+        if is_small && self.spent.operations + solve <= work {
+            return self.solve_by_newton(bodies, around, Effort::Full).unwrap_or(false);
+        }
+        if let Some(changed) = self.try_newton(bodies, around) {
             return changed;
         }
-        let (first, mut near, mut changed) = (self.work.error, NEARLY_STILL, false);
-        for round in 0..SHIFT_ROUNDS[1] {
-            let left = (budget - self.spent.products).max(0.0);
-            let is_near = cheap && left > 0.0 && self.work.error <= near;
-            if is_near {
-                let newton = Newton { limit: NEAR_STEPS, ..Newton::NEAR };
-                if let Some(moved) = self.spend_on_newton(bodies, around, newton, factorization) {
-                    return changed | moved;
-                }
-                near *= 0.1;
-            }
-            let error = if cheap { near } else { REDUCTION * first };
-            let most = if cheap { usize::MAX } else { PRODUCTS[1] };
-            let products = ((0.5 * left) as usize).min(most).max(PRODUCTS[0]);
-            let aim =
-                Aim { error, products, blend: if round == 0 && left > 0.0 { 1.0 } else { SHIFT_BLEND } };
-            let (done, moved) = self.solve_freely(bodies, around, aim);
-            changed |= moved;
-            let is_done = if cheap { done.products == 0 } else { self.work.error <= error };
-            if left <= PRODUCTS[0] as f64 {
-                self.work.is_exhausted = true;
-            }
-            if is_done || self.work.is_exhausted {
-                break;
-            }
+        let changed = self.solve_by_sweeps(bodies, around);
+        let effort = if is_small && self.spent.operations < LOADED_WORK && self.overlaps(bodies) {
+            Effort::Full
+        } else if is_still && self.work.error <= NEARLY_SOLVED && self.spent.operations + solve <= STILL_WORK
+        {
+            Effort::Near
+        } else {
+            return changed;
+        };
+        self.measure(bodies, context);
+        self.solve_by_newton(bodies, around, effort).unwrap_or(false) | changed
+    }
+
+    /// Whether something rigid that yields might take part: sweeps carry a load through light things slowly.
+    fn has_loads(&self, context: &SolveContext<'_>) -> bool {
+        let yields = |endpoint: &Endpoint| endpoint.proxy().is_some_and(|p| context.proxies.yields(p));
+        self.constraints.iter().any(|constraint| constraint.endpoints.iter().any(yields))
+    }
+
+    /// Newton's method from the forces as they are, if a factorization is cheap and the last one was not in vain.
+    fn try_newton(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) -> Option<bool> {
+        let is_near = self.spent.iterations == 0 || self.work.error <= NEARLY_SOLVED;
+        let is_cheap = self.groups.factor_work() <= WARM_WORK * self.groups.product_work();
+        if !(is_near && is_cheap && self.spent.failures < WARM_FAILURES) {
+            return None;
         }
+        let changed = self.solve_by_newton(bodies, around, Effort::Warm);
+        self.spent.failures += usize::from(changed.is_none());
         changed
     }
 
-    /// [`Self::solve_densely`], with what that takes counted as products.
-    fn spend_on_newton(
-        &mut self,
-        bodies: &mut [BodyProblem],
-        around: Around<'_>,
-        newton: Newton,
-        factorization: f64,
-    ) -> Option<bool> {
-        let before = self.work.factorizations;
-        let changed = self.solve_densely(bodies, around, newton);
-        self.spent.products += (self.work.factorizations - before) as f64 * factorization;
-        self.dense.has_failed = changed.is_none();
-        changed
+    /// Whether no node moves farther in the step, and nothing overlaps deeper, than a small part of the edges.
+    fn is_still(&self, bodies: &[BodyProblem], h: f64) -> bool {
+        let shortest = bodies.iter().map(|b| b.model.surface.mean_edge).fold(f64::INFINITY, f64::min);
+        let (far, fast) = (STILL * shortest, STILL * shortest / h);
+        let is_slow = |body: &BodyProblem| body.v_start.iter().all(|v| v.norm_squared() <= fast * fast);
+        bodies.iter().all(is_slow) && self.constraints.iter().all(|c| c.target_gap >= -far)
     }
 
-    /// Operations of a product with W and of the coarse problem before it, about: four for every number of a factor, and
-    /// what was measured for a contact and a body.
-    fn product_work(&self, bodies: &[BodyProblem], factors: Factors<'_>) -> f64 {
-        let numbers = bodies.iter().enumerate().map(|(i, b)| factors.of(i, b).symbolic.factor_len());
-        (4 * numbers.sum::<usize>() + 3000 * bodies.len() + 2000 * self.active()) as f64
-    }
-
-    /// The gradient of the present forces, and their error.
-    fn set_gradient(&mut self, tolerance: ConeTolerance) {
-        let mut r = std::mem::take(&mut self.free.r);
-        r.clone_from(&self.motions);
-        self.add_targets(&mut r);
-        self.gaps.clone_from(&r);
-        for (contact, shift) in self.free.metric.contacts.iter().zip(&self.shift) {
-            r[contact.first] += shift;
-        }
-        self.work.error = self.free.metric.error(&self.lambda, &r, tolerance);
-        self.free.r = r;
-    }
-
-    fn update_metric(&mut self, bodies: &[BodyProblem], Around { factors, context, .. }: Around<'_>) {
-        // Any metric serves: frames that turn by less than a radian do not matter to it.
-        if self.free.change >= Change::Factors {
-            let parts = CoarseParts { bodies, factors, proxies: context.proxies, h: context.h };
-            let constraints = &self.constraints[..self.active()];
-            self.free.coarse.update(&mut self.free.metric, constraints, parts);
-            self.free.change = Change::Nothing;
-        }
+    /// Whether contacts still overlap by more than a share of their bodies' edges.
+    fn overlaps(&self, bodies: &[BodyProblem]) -> bool {
+        let edge = |endpoint: &Endpoint| match endpoint {
+            Endpoint::Soft { body, .. } => bodies[*body].model.surface.mean_edge,
+            Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => f64::INFINITY,
+        };
+        let contacts = self.constraints[..self.active()].iter().zip(&self.dense.problem.offsets);
+        contacts.filter(|(constraint, _)| matches!(constraint.law, Law::Contact { .. })).any(
+            |(constraint, &first)| {
+                let shortest = edge(&constraint.endpoints[0]).min(edge(&constraint.endpoints[1]));
+                self.gaps[first] < -OVERLAP_LEFT * shortest
+            },
+        )
     }
 
     /// Takes the motions along the contacts' directions to the bodies' trial positions.
-    fn measure(&mut self, bodies: &[BodyProblem], context: &SolveContext<'_>) {
+    pub(super) fn measure(&mut self, bodies: &[BodyProblem], context: &SolveContext<'_>) {
         let reactions = self.collect_reactions(context);
         let mut motions = std::mem::take(&mut self.motions);
         motions.clear();
@@ -177,11 +132,19 @@ impl ContactSystem {
             motions.extend(constraint.directions().iter().map(|d| d.dot(&moved)));
         }
         self.motions = motions;
-        self.give_back(reactions);
+        self.reactions = reactions;
+    }
+
+    /// Takes the gaps above their targets, and the slips, from the motions.
+    pub(super) fn set_gaps(&mut self) {
+        self.gaps.clone_from(&self.motions);
+        let mut gaps = std::mem::take(&mut self.gaps);
+        self.add_targets(&mut gaps);
+        self.gaps = gaps;
     }
 
     /// What makes gaps above their targets of motions.
-    fn add_targets(&self, motions: &mut [f64]) {
+    pub(super) fn add_targets(&self, motions: &mut [f64]) {
         for (constraint, &first) in self.constraints.iter().zip(&self.dense.problem.offsets[..self.active()])
         {
             // What the constraint itself gives way by is no motion of its ends.
@@ -189,142 +152,8 @@ impl ContactSystem {
         }
     }
 
-    /// Brings W and W λ up to date, and the solver's expectation where the problem is another one.
-    pub(super) fn assemble(&mut self, bodies: &[BodyProblem], Around { factors, context, .. }: Around<'_>) {
-        let change = std::mem::take(&mut self.dense.change);
-        if change == Change::Nothing {
-            return;
-        }
-        let dense = &mut self.dense;
-        if change > Change::Forces {
-            let rows = ContactRows {
-                constraints: &self.constraints[..self.geometry.len()],
-                geometry: &self.geometry,
-                offsets: &dense.problem.offsets,
-                groups: &self.groups,
-            };
-            let W = &mut dense.problem.W;
-            if dense.delassus.update(W, &rows, bodies, factors, context.proxies, context.h) {
-                dense.problem.groups.clone_from(&self.groups.starts);
-                dense.problem.filled.clone_from(&self.groups.filled);
-                dense.problem.version += 1;
-            }
-        }
-        dense.problem.multiply(&self.lambda, &mut dense.slips);
-        if matches!(change, Change::Contacts | Change::Forces) {
-            self.predict(bodies, context);
-        }
-    }
-
-    /// Lets the solve begin where the last step's forces and slips were, and where the bodies' trial positions are.
-    fn predict(&mut self, bodies: &[BodyProblem], context: &SolveContext<'_>) {
-        let reactions = self.collect_reactions(context);
-        let constraints = &self.constraints;
-        let end = |i: usize| end(&constraints[i], bodies, context, &reactions);
-        let dense = &mut self.dense;
-        dense.solver.predict(&dense.problem, &self.lambda, &self.shift, end);
-        self.give_back(reactions);
-    }
-
-    /// Newton's method; whether the forces have changed, or `None` if it failed and they are as they were.
-    fn solve_densely(
-        &mut self,
-        bodies: &mut [BodyProblem],
-        around: Around<'_>,
-        newton: Newton,
-    ) -> Option<bool> {
-        self.assemble(bodies, around);
-        self.before.clone_from(&self.lambda);
-        self.shift_before.clone_from(&self.shift);
-        let mut g_free = std::mem::take(&mut self.dense.g_free);
-        g_free.clear();
-        g_free.extend(self.motions.iter().zip(&self.dense.slips).map(|(motion, slip)| motion - slip));
-        self.add_targets(&mut g_free);
-        self.dense.g_free = g_free;
-        let slides = self.constraints[..self.active()].iter().any(|constraint| constraint.dimension() == 3);
-        let mut left = newton.limit;
-        for _ in 0..if slides { SHIFT_ROUNDS[0] } else { 1 } {
-            let dense = &mut self.dense;
-            dense.problem.g.clone_from(&dense.g_free);
-            for (shift, first) in self.shift.iter().zip(&dense.problem.offsets) {
-                dense.problem.g[*first] += shift;
-            }
-            let newton = Newton { limit: left, ..newton };
-            let done = dense.solver.solve(
-                &dense.problem,
-                &mut self.lambda,
-                &mut dense.slips,
-                around.tolerance,
-                newton,
-            );
-            self.work.newton_steps += done.newton_steps;
-            self.work.factorizations += done.factorizations;
-            self.work.failures += done.failures;
-            left = left.saturating_sub(done.factorizations);
-            if done.failures > 0 && !newton.keeps_failures {
-                self.lambda.clone_from(&self.before);
-                self.shift.clone_from(&self.shift_before);
-                self.outdate_forces();
-                return None;
-            }
-            self.gaps.clear();
-            self.gaps.extend(dense.g_free.iter().zip(&dense.slips).map(|(gap, slip)| gap + slip));
-            self.update_shifts(1.0);
-        }
-        self.work.error = 0.0;
-        let changed = self.before != self.lambda;
-        if changed {
-            self.scatter_changes(bodies);
-            for (index, body) in bodies.iter_mut().enumerate() {
-                body.contact_step(around.factors.of(index, body));
-            }
-        }
-        Some(changed)
-    }
-
-    /// Projected gradients; what they took and whether the forces have changed.
-    fn solve_freely(
-        &mut self,
-        bodies: &mut [BodyProblem],
-        Around { factors, context, tolerance }: Around<'_>,
-        aim: Aim,
-    ) -> (GradientWork, bool) {
-        self.before.clone_from(&self.lambda);
-        let active = self.active();
-        let free = &mut self.free;
-        let mut operator = MatrixFree {
-            constraints: &self.constraints[..active],
-            bodies: &mut *bodies,
-            factors,
-            context,
-            response: &mut free.response,
-        };
-        let forces = [&mut self.lambda[..], &mut free.r[..]];
-        let tolerance_now = ConeTolerance { relative: tolerance.relative.max(aim.error), ..tolerance };
-        let done = free.method.solve(&free.metric, forces, tolerance_now, aim.products, &mut operator);
-        self.work.products += done.products;
-        self.spent.products += done.products as f64;
-        self.gaps.clone_from(&self.free.r);
-        for (contact, shift) in self.free.metric.contacts.iter().zip(&self.shift) {
-            self.gaps[contact.first] -= shift;
-        }
-        self.update_shifts(aim.blend);
-        self.outdate_forces();
-        let changed = self.before != self.lambda;
-        if changed {
-            self.scatter_changes(bodies);
-        }
-        self.measure(bodies, context);
-        self.set_gradient(tolerance);
-        (done, changed)
-    }
-
-    fn outdate_forces(&mut self) {
-        self.dense.change = self.dense.change.max(Change::Forces);
-    }
-
     /// σ = μ‖slip‖ of contacts that carry, 0 of open ones; so much of it is taken.
-    fn update_shifts(&mut self, blend: f64) {
+    pub(super) fn update_shifts(&mut self, blend: f64) {
         for i in 0..self.active() {
             let first = self.dense.problem.offsets[i];
             let mut shift = 0.0;

@@ -20,6 +20,10 @@ mod system;
 
 mod improve;
 
+mod with_matrix;
+
+mod without_matrix;
+
 #[cfg(test)]
 mod tests;
 

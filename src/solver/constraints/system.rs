@@ -15,7 +15,7 @@ use crate::body::{ConstraintGeometry, ConstraintMemory};
 use crate::contact::{Constraint, Endpoint, Law};
 use crate::math::Vec3;
 use crate::solver::body_step::BodyProblem;
-use crate::solver::cone::{ConeMetric, ConeProblem, ConeSolver, ProjectedGradient};
+use crate::solver::cone::{ConeMetric, ConeProblem, ConeSolver, ConeSweeps, ProjectedGradient};
 
 /// Contacts of the bodies of one island.
 #[derive(Default)]
@@ -35,7 +35,7 @@ pub(crate) struct ContactSystem {
     pub(super) gaps: Vec<f64>,
     pub(super) before: Vec<f64>,
     pub(super) shift_before: Vec<f64>,
-    reactions: Vec<Reaction>,
+    pub(super) reactions: Vec<Reaction>,
     /// Where each contact acts, for W.
     pub(super) geometry: Vec<ConstraintGeometry>,
     pub(super) groups: ContactGroups,
@@ -48,13 +48,15 @@ pub(crate) struct ContactSystem {
 /// What was spent of the step's budget.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Spent {
-    /// Products, and factorizations of crowds in their place.
-    pub products: f64,
-    /// Of factorizations of small islands.
+    /// Sweeps, and products in their place.
+    pub iterations: usize,
+    /// Of factorizations.
     pub operations: usize,
+    /// Newton's method from the forces as they were.
+    pub failures: usize,
 }
 
-/// Newton's method with the Delassus operator as a matrix.
+/// Newton's method and sweeps, with the Delassus operator as a matrix.
 #[derive(Default)]
 pub(super) struct DenseSolve {
     pub problem: ConeProblem,
@@ -64,8 +66,7 @@ pub(super) struct DenseSolve {
     pub slips: Vec<f64>,
     pub change: Change,
     pub g_free: Vec<f64>,
-    /// Its last try from the forces of the step before has failed.
-    pub has_failed: bool,
+    pub sweeps: ConeSweeps,
 }
 
 /// Projected gradients, which only multiply with it.
@@ -101,6 +102,7 @@ pub(crate) struct ContactWork {
     pub factorizations: usize,
     /// Solves that Newton's method did not finish.
     pub failures: usize,
+    pub sweeps: usize,
     pub products: usize,
     /// The budget is gone.
     pub is_exhausted: bool,
@@ -110,6 +112,7 @@ pub(crate) struct ContactWork {
 
 /// Compliance [m/N] of contacts of a body that keeps its shape with itself: any positive number.
 const WITHIN_A_SHAPE: f64 = 1.0e-6;
+
 impl ContactSystem {
     pub fn is_empty(&self) -> bool {
         self.constraints.is_empty()
@@ -129,7 +132,6 @@ impl ContactSystem {
         self.open.clear();
         self.work = ContactWork::default();
         self.renew_budget();
-        self.dense.has_failed = false;
         self.free.method.begin();
         let carries =
             |constraint: &Constraint| constraint.warm_force != Vec3::zeros() || constraint.key.is_shared();
@@ -215,11 +217,6 @@ impl ContactSystem {
         reactions.resize(context.proxies.list.len(), Reaction::default());
         self.add_reactions(context.proxies, context.h, &mut reactions);
         reactions
-    }
-
-    /// The memory of [`Self::collect_reactions`].
-    pub(super) fn give_back(&mut self, reactions: Vec<Reaction>) {
-        self.reactions = reactions;
     }
 
     /// What the contacts of a body have put into all that they touch \[J\]: work on both of their sides, with the bodies

@@ -38,6 +38,11 @@ impl CoarseInverse {
             modes: Some(AffineModes::new(model, pins, symbolic, values)),
         }
     }
+
+    /// Without modes: of what falls short of the inverse, of its affine part most of all, or seldom goes without columns.
+    pub fn local(pins: &[u32], symbolic: &Symbolic, values: &[f64]) -> Self {
+        Self { local: symbolic.upper(values).local_compliance(symbolic.d, pins), modes: None }
+    }
 }
 
 /// Eigenvalues below this part of the largest belong to functions that vanish on the body, as across a sheet. Rigid

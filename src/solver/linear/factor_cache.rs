@@ -219,7 +219,12 @@ impl FactorCache {
             return Some((Factor::Iterative(Box::new(operator)), coarse));
         }
         let values = system::assemble(&body.model, &body.material, &key.pins, key.system, h, symbolic);
-        let mut coarse = CoarseInverse::new(&body.model, &key.pins, symbolic, &values);
+        let coarse = match key.solver {
+            Solver::Projective | Solver::ConjugateGradients => {
+                CoarseInverse::new(&body.model, &key.pins, symbolic, &values)
+            }
+            _ => CoarseInverse::local(&key.pins, symbolic, &values),
+        };
         let factor = match key.solver {
             Solver::Projective | Solver::ConjugateGradients => {
                 let factor = symbolic.factorize(&values, &mut self.scratch).ok()?;
@@ -231,10 +236,6 @@ impl FactorCache {
             // Newton's method makes its own, and falls back on this.
             Solver::Jacobi | Solver::Newton => Factor::Jacobi(symbolic.upper(&values).inverse_row_sums()),
         };
-        if factor.is_rough() {
-            // What stands in for the inverse falls short of it, of its affine part most of all.
-            coarse.modes = None;
-        }
         Some((factor, coarse))
     }
 

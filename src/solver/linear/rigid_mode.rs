@@ -11,17 +11,21 @@ pub(crate) struct RigidMode {
     by_moment: Mat3,
 }
 
+/// The centre of mass of what keeps its shape, and its mobility over mass and inertia.
+pub(crate) fn rigid_mobility(x: &[Vec3], masses: &[f64], mobility: f64) -> (Vec3, f64, Mat3) {
+    let (total, centre) = centre_of_mass(x, masses);
+    let inertia = inertia_about(&centre, x, masses);
+    let turned = [0, 1, 2].map(|c| solve_semidefinite(&inertia, &Vec3::ith(c, 1.0)) * mobility);
+    (centre, mobility / total, Mat3::from_columns(&turned))
+}
+
 impl RigidMode {
     /// Of masses at `x`, with a mobility of `h²/(1 + αh)` [s²].
     pub fn set(&mut self, x: &[Vec3], masses: &[f64], mobility: f64) {
-        let (total, centre) = centre_of_mass(x, masses);
+        let centre;
+        (centre, self.by_force, self.by_moment) = rigid_mobility(x, masses, mobility);
         self.arms.clear();
         self.arms.extend(x.iter().map(|x| x - centre));
-        let inertia = inertia_about(&centre, x, masses);
-        self.by_force = mobility / total;
-        for c in 0..3 {
-            self.by_moment.set_column(c, &(solve_semidefinite(&inertia, &Vec3::ith(c, 1.0)) * mobility));
-        }
     }
 
     /// Displacements \[m\] of forces \[N\] on the nodes.

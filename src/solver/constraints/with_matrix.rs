@@ -1,0 +1,129 @@
+//! Contact forces with the Delassus operator as a matrix: Newton's method, and sweeps over the contacts.
+
+use super::delassus::ContactRows;
+use super::gaps::end;
+use super::improve::Around;
+use super::system::{Change, ContactSystem};
+use crate::solver::body_step::BodyProblem;
+use crate::solver::cone::Effort;
+
+/// Solves with a fresh shift of Newton's method.
+const SHIFT_ROUNDS: usize = 2;
+/// Part of what is left of a step's iterations that one solve by sweeps may take, and the fewest that it takes.
+const SHARE: f64 = 1.0 / 3.0;
+const SWEEPS: usize = 2;
+
+impl ContactSystem {
+    /// Brings W and W λ up to date, and Newton's expectation where the problem is another one.
+    pub(super) fn assemble(&mut self, bodies: &[BodyProblem], Around { factors, context, .. }: Around<'_>) {
+        let change = std::mem::take(&mut self.dense.change);
+        if change == Change::Nothing {
+            return;
+        }
+        let dense = &mut self.dense;
+        if change > Change::Forces {
+            let rows = ContactRows {
+                constraints: &self.constraints[..self.geometry.len()],
+                geometry: &self.geometry,
+                offsets: &dense.problem.offsets,
+                groups: &self.groups,
+            };
+            let W = &mut dense.problem.W;
+            if dense.delassus.update(W, &rows, bodies, factors, context.proxies, context.h) {
+                dense.problem.groups.clone_from(&self.groups.starts);
+                dense.problem.filled.clone_from(&self.groups.filled);
+                dense.problem.version += 1;
+            }
+        }
+        dense.problem.multiply(&self.lambda, &mut dense.slips);
+        if matches!(change, Change::Contacts | Change::Forces) {
+            self.predict(bodies, context);
+        }
+    }
+
+    /// Lets Newton's method begin where the last forces and slips were, and where the bodies' trial positions are.
+    fn predict(&mut self, bodies: &[BodyProblem], context: &super::SolveContext<'_>) {
+        let reactions = self.collect_reactions(context);
+        let constraints = &self.constraints;
+        let end = |i: usize| end(&constraints[i], bodies, context, &reactions);
+        let dense = &mut self.dense;
+        dense.solver.predict(&dense.problem, &self.lambda, &self.shift, end);
+        self.reactions = reactions;
+    }
+
+    /// Newton's method; whether the forces have changed, or `None` if it failed and they are as they were.
+    pub(super) fn solve_by_newton(
+        &mut self,
+        bodies: &mut [BodyProblem],
+        around: Around<'_>,
+        effort: Effort,
+    ) -> Option<bool> {
+        self.assemble(bodies, around);
+        self.before.clone_from(&self.lambda);
+        self.shift_before.clone_from(&self.shift);
+        let mut g_free = std::mem::take(&mut self.dense.g_free);
+        g_free.clear();
+        g_free.extend(self.motions.iter().zip(&self.dense.slips).map(|(motion, slip)| motion - slip));
+        self.add_targets(&mut g_free);
+        self.dense.g_free = g_free;
+        let slides = self.constraints[..self.active()].iter().any(|constraint| constraint.dimension() == 3);
+        for _ in 0..if slides { SHIFT_ROUNDS } else { 1 } {
+            let dense = &mut self.dense;
+            dense.problem.g.clone_from(&dense.g_free);
+            for (shift, first) in self.shift.iter().zip(&dense.problem.offsets) {
+                dense.problem.g[*first] += shift;
+            }
+            let (lambda, product) = (&mut self.lambda, &mut dense.slips);
+            let done = dense.solver.solve(&dense.problem, lambda, product, around.tolerance, effort);
+            self.work.newton_steps += done.newton_steps;
+            self.work.factorizations += done.factorizations;
+            self.work.failures += done.failures;
+            self.spent.operations += done.factorizations * self.groups.factor_work();
+            if done.failures > 0 && effort != Effort::Full {
+                self.lambda.clone_from(&self.before);
+                self.shift.clone_from(&self.shift_before);
+                self.outdate(Change::Forces);
+                return None;
+            }
+            self.gaps.clear();
+            self.gaps.extend(dense.g_free.iter().zip(&dense.slips).map(|(gap, slip)| gap + slip));
+            self.update_shifts(1.0);
+        }
+        self.work.error = 0.0;
+        Some(self.move_bodies(bodies, around))
+    }
+
+    /// Sweeps over the contacts, as many as a share of the step's budget; whether the forces have changed.
+    pub(super) fn solve_by_sweeps(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) -> bool {
+        self.assemble(bodies, around);
+        self.before.clone_from(&self.lambda);
+        self.set_gaps();
+        let left = around.context.limits.iterations.saturating_sub(self.spent.iterations);
+        let budget = ((SHARE * left as f64) as usize).max(SWEEPS);
+        let (problem, forces) = (&self.dense.problem, [&mut self.lambda[..], &mut self.gaps[..]]);
+        let done = self.dense.sweeps.solve(problem, forces, around.tolerance, budget);
+        self.work.sweeps += done.sweeps;
+        self.spent.iterations += done.sweeps;
+        self.work.error = done.error;
+        self.work.is_exhausted |= left <= budget;
+        if !done.error.is_finite() {
+            self.lambda.clone_from(&self.before);
+            self.set_gaps();
+        }
+        self.update_shifts(1.0);
+        self.outdate(Change::Forces);
+        self.move_bodies(bodies, around)
+    }
+
+    /// Moves the bodies to what the forces have become since `before`, if they have changed.
+    fn move_bodies(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) -> bool {
+        let changed = self.before != self.lambda;
+        if changed {
+            self.scatter_changes(bodies);
+            for (index, body) in bodies.iter_mut().enumerate() {
+                body.contact_step(around.factors.of(index, body));
+            }
+        }
+        changed
+    }
+}

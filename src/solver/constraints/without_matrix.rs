@@ -1,0 +1,109 @@
+//! Contact forces by projected gradients, which only multiply with the Delassus operator: where a body's columns would
+//! cost more than the contacts are worth.
+
+use super::coarse_space::CoarseParts;
+use super::improve::Around;
+use super::matrix_free::MatrixFree;
+use super::system::{Change, ContactSystem};
+use crate::solver::body_step::BodyProblem;
+use crate::solver::cone::ConeTolerance;
+
+/// Solves with a fresh shift.
+const SHIFT_ROUNDS: usize = 4;
+/// Part of a new shift that is taken from the second round on: whole ones swing to and fro in an impact.
+const SHIFT_BLEND: f64 = 0.5;
+/// Products of one solve, at least and at the most.
+const PRODUCTS: [usize; 2] = [2, 10];
+/// Iterations of the step's budget that a product, with the coarse problem before it, counts for.
+const PRODUCT_COST: usize = 2;
+/// Part of its first error that a solve leaves to the next outer iteration.
+const REDUCTION: f64 = 0.1;
+
+/// How far one solve goes.
+#[derive(Clone, Copy)]
+struct Aim {
+    error: f64,
+    products: usize,
+    blend: f64,
+}
+
+impl ContactSystem {
+    /// Improves the forces by a share of the step's budget; whether they have changed.
+    pub(super) fn improve_without_matrix(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) -> bool {
+        self.update_metric(bodies, around);
+        self.set_gradient(around.tolerance);
+        let error = REDUCTION * self.work.error;
+        let mut changed = false;
+        for round in 0..SHIFT_ROUNDS {
+            let left = around.context.limits.iterations.saturating_sub(self.spent.iterations) / PRODUCT_COST;
+            let products = (left / 2).clamp(PRODUCTS[0], PRODUCTS[1]);
+            let blend = if round == 0 && left > 0 { 1.0 } else { SHIFT_BLEND };
+            changed |= self.solve_by_gradients(bodies, around, Aim { error, products, blend });
+            self.work.is_exhausted |= left <= PRODUCTS[0];
+            if self.work.error <= error || self.work.is_exhausted {
+                break;
+            }
+        }
+        changed
+    }
+
+    fn update_metric(&mut self, bodies: &[BodyProblem], Around { factors, context, .. }: Around<'_>) {
+        // Any metric serves; frames that turn within a step do not matter to it.
+        if self.free.change >= Change::Factors {
+            let parts = CoarseParts { bodies, factors, proxies: context.proxies, h: context.h };
+            let constraints = &self.constraints[..self.active()];
+            self.free.coarse.update(&mut self.free.metric, constraints, parts);
+            self.free.change = Change::Nothing;
+        }
+    }
+
+    /// The gradient of the present forces, and their error.
+    fn set_gradient(&mut self, tolerance: ConeTolerance) {
+        self.set_gaps();
+        self.shift_gradient(tolerance);
+    }
+
+    fn shift_gradient(&mut self, tolerance: ConeTolerance) {
+        let free = &mut self.free;
+        free.r.clone_from(&self.gaps);
+        for (contact, shift) in free.metric.contacts.iter().zip(&self.shift) {
+            free.r[contact.first] += shift;
+        }
+        self.work.error = free.metric.error(&self.lambda, &free.r, tolerance);
+    }
+
+    /// One solve at a given shift, and a new shift; whether the forces have changed.
+    fn solve_by_gradients(
+        &mut self,
+        bodies: &mut [BodyProblem],
+        Around { factors, context, tolerance }: Around<'_>,
+        aim: Aim,
+    ) -> bool {
+        self.before.clone_from(&self.lambda);
+        let active = self.active();
+        let free = &mut self.free;
+        let mut operator = MatrixFree {
+            constraints: &self.constraints[..active],
+            bodies: &mut *bodies,
+            factors,
+            context,
+            response: &mut free.response,
+        };
+        let forces = [&mut self.lambda[..], &mut free.r[..]];
+        let rough = ConeTolerance { relative: tolerance.relative.max(aim.error), ..tolerance };
+        let done = free.method.solve(&free.metric, forces, rough, aim.products, &mut operator);
+        self.work.products += done.products;
+        self.spent.iterations += PRODUCT_COST * done.products;
+        self.outdate(Change::Forces);
+        let changed = self.before != self.lambda;
+        if changed {
+            self.scatter_changes(bodies);
+        }
+        // The products have moved the bodies: what they add up to is measured, as rounding would add up too.
+        self.measure(bodies, context);
+        self.set_gaps();
+        self.update_shifts(aim.blend);
+        self.shift_gradient(tolerance);
+        changed
+    }
+}
