@@ -221,11 +221,11 @@ impl Between<'_> {
             ) if i == j => {
                 let body = &self.bodies[*i];
                 let factor = self.factors.of(*i, body);
-                let columns = &factor.columns;
                 let has_one_frame = body.preconditioner.one_frame().is_some();
                 for l in 0..*n {
                     for k in 0..*m {
-                        let mut block = columns.block(places[k], places_b[l]);
+                        let (on, at) = ([places[k], places_b[l]], [nodes[k], nodes_b[l]]);
+                        let mut block = body.preconditioner.inverse_block(factor, on, at);
                         if !has_one_frame {
                             block = body.preconditioner.compliance(factor, &block, nodes[k], nodes_b[l]);
                         }

@@ -36,6 +36,8 @@ struct Entry {
     key: FactorKey,
     model: Arc<DeformableModel>,
     last_used: u64,
+    /// The same for all factors that differ by their step alone.
+    family: u64,
 }
 
 /// Where a cache keeps a factor, for the present step.
@@ -50,7 +52,8 @@ pub(crate) struct FactorCache {
     factors: Vec<Entry>,
     places: HashMap<FactorKey, usize>,
     scratch: FactorScratch,
-    ages: Vec<u64>,
+    /// Family, and step in which it was last used.
+    ages: Vec<(u64, u64)>,
     /// \[bytes\]; and what the bodies of this step have asked for so far.
     column_budget: usize,
     columns_wanted: usize,
@@ -77,10 +80,12 @@ const FEW_NODES: usize = 64;
 /// Operations of an iterative solve per node, over those of a number of a factor.
 const ITERATIVE: usize = 3000;
 
-/// Steps after which an unused factor is dropped: two seconds at game speed.
+/// Steps after which unused factors are dropped, for all steps of a body together: two seconds at game speed.
 const UNUSED_STEPS: u64 = 120;
-/// Unused factors that are kept at all.
+/// Unused bodies' factors that are kept at all.
 const MAX_UNUSED: usize = 8;
+/// Factors that differ by their step alone which are kept: random ones between 1/144 and 1/30 s want six.
+pub(crate) const STEPS_KEPT: usize = 8;
 
 impl FactorCache {
     /// Starts a step: forgets factors that nobody used for a while, and, least recently used first,
@@ -89,17 +94,7 @@ impl FactorCache {
         self.step += 1;
         self.column_budget = column_budget;
         self.columns_wanted = 0;
-        let oldest = self.step.saturating_sub(UNUSED_STEPS);
-        self.forget_before(oldest);
-        // A material or a step that changes all the time must not fill the memory with old factors.
-        let now = self.step;
-        self.ages.clear();
-        self.ages.extend(self.factors.iter().map(|f| f.last_used).filter(|used| used + 1 < now));
-        if self.ages.len() > MAX_UNUSED {
-            self.ages.sort_unstable();
-            let cutoff = self.ages[self.ages.len() - MAX_UNUSED];
-            self.forget_before(cutoff);
-        }
+        self.forget_unused();
         while self.column_bytes() > column_budget {
             let idle = |f: &&mut Entry| f.made.columns.bytes() > 0;
             let Some(oldest) = self.factors.iter_mut().filter(idle).min_by_key(|f| (f.last_used, f.model.id))
@@ -110,29 +105,58 @@ impl FactorCache {
         }
     }
 
-    /// Forgets factors that were last used before this step.
-    fn forget_before(&mut self, oldest: u64) {
-        if self.factors.iter().all(|f| f.last_used >= oldest) {
+    /// A material that changes all the time must not fill the memory with old factors; a step that does comes back to
+    /// those of its family.
+    fn forget_unused(&mut self) {
+        let now = self.step;
+        if self.factors.iter().all(|f| f.last_used + 1 >= now) {
             return;
         }
-        self.factors.retain(|f| f.last_used >= oldest);
+        // The latest use of every family, the latest first.
+        self.ages.clear();
+        self.ages.extend(self.factors.iter().map(|f| (f.family, f.last_used)));
+        self.ages.sort_unstable_by_key(|&(family, used)| (family, std::cmp::Reverse(used)));
+        self.ages.dedup_by_key(|(family, _)| *family);
+        self.ages.sort_unstable_by_key(|&(_, used)| std::cmp::Reverse(used));
+        let in_use = self.ages.iter().take_while(|(_, used)| used + 1 >= now).count();
+        self.ages.truncate(in_use + MAX_UNUSED);
+        let oldest = now.saturating_sub(UNUSED_STEPS);
+        self.ages.retain(|(_, used)| *used >= oldest);
+        self.ages.sort_unstable();
+        let (ages, before) = (&self.ages, self.factors.len());
+        self.factors.retain(|f| ages.binary_search_by_key(&f.family, |(family, _)| *family).is_ok());
+        if self.factors.len() < before {
+            self.find_places();
+        }
+    }
+
+    /// Where a factor of a family may take the place of another: of one not used in this step, if there are many.
+    fn outlived(&self, family: u64) -> Option<usize> {
+        let own = || self.factors.iter().enumerate().filter(|(_, f)| f.family == family);
+        let unused = own().filter(|(_, f)| f.last_used < self.step);
+        let oldest = unused.min_by_key(|(_, f)| f.last_used).map(|(place, _)| place);
+        oldest.filter(|_| own().count() >= STEPS_KEPT)
+    }
+
+    fn find_places(&mut self) {
         self.places.clear();
         self.places.extend(self.factors.iter().enumerate().map(|(place, f)| (f.key.clone(), place)));
         self.symbolic.retain(|(model, ..), _| self.factors.iter().any(|f| f.key.model == *model));
     }
 
-    /// Makes sure the factor of a body and the inverse's columns at these surface nodes are there.
+    /// Makes sure the factor of a body and the inverse's columns at these surface nodes are there; `steps` factors of the
+    /// body may come to want such.
     /// `None` when the matrix is not positive definite in double precision.
     pub fn prepare(
         &mut self,
         key: &FactorKey,
         body: &DeformableBody,
-        h: f64,
+        steps: usize,
         surface_nodes: impl Iterator<Item = u32>,
     ) -> Option<CacheWork> {
         let mut work = CacheWork::default();
         if !self.places.contains_key(key) {
-            self.make(key, body, h)?;
+            self.make(key, body)?;
             work.factorizations = 1;
         }
         work.id = FactorId(*self.places.get(key)?);
@@ -144,7 +168,7 @@ impl FactorCache {
         self.nodes.dedup();
         let Entry { made: SystemFactor { symbolic, factor, columns, .. }, model, .. } = entry;
         // Decided by what is asked for, not by what is there: a fresh cache comes to the same bits.
-        self.columns_wanted += columns.bytes_of(self.nodes.len());
+        self.columns_wanted += steps * columns.bytes_of(self.nodes.len());
         work.has_columns = columns_pay(symbolic, factor, model, self.nodes.len())
             && self.columns_wanted <= self.column_budget;
         if work.has_columns {
@@ -155,8 +179,8 @@ impl FactorCache {
     }
 
     /// Makes a body's factor, and the columns of all of its surface if few contacts pay for theirs; as [`Self::prepare`].
-    pub fn prepare_surface(&mut self, key: &FactorKey, body: &DeformableBody, h: f64) -> Option<CacheWork> {
-        let mut work = self.prepare(key, body, h, std::iter::empty())?;
+    pub fn prepare_surface(&mut self, key: &FactorKey, body: &DeformableBody) -> Option<CacheWork> {
+        let mut work = self.prepare(key, body, 1, std::iter::empty())?;
         let Entry { made: SystemFactor { symbolic, factor, columns, .. }, model, .. } =
             &mut self.factors[work.id.0];
         let all = 0..model.surface.nodes.len() as u32;
@@ -183,25 +207,37 @@ impl FactorCache {
     }
 
     /// Makes and keeps the factor of a body.
-    fn make(&mut self, key: &FactorKey, body: &DeformableBody, h: f64) -> Option<()> {
+    fn make(&mut self, key: &FactorKey, body: &DeformableBody) -> Option<()> {
         let symbolic = self.pattern(key, body)?;
-        let (factor, coarse) = self.factor_of(key, body, h, &symbolic)?;
+        let (factor, coarse) = self.factor_of(key, body, &symbolic)?;
         let columns = ComplianceColumns::new(&body.model.surface, key.system);
         let clusters = (key.clusters > 0).then(|| {
-            let weight = laplacian_weight(&body.material) * stiffening(&body.material, h);
+            let weight = laplacian_weight(&body.material) * stiffening(&body.material, key.h());
             let (pins, scratch) = (&key.pins, &mut self.scratch);
             Clusters::new(&body.model, key.clusters, weight, pins, &symbolic, &factor, scratch)
         });
         let serial = self.made;
+        let related = self.factors.iter().find(|f| f.key.is_of_another_step(key));
+        let family = related.map_or(serial, |f| f.family);
         let made = Entry {
             made: SystemFactor { symbolic, factor, system: key.system, columns, clusters, coarse, serial },
             key: key.clone(),
             model: body.model.clone(),
             last_used: self.step,
+            family,
         };
         self.made += 1;
-        self.places.insert(key.clone(), self.factors.len());
-        self.factors.push(made);
+        match self.outlived(family) {
+            Some(place) => {
+                self.places.remove(&self.factors[place].key);
+                self.places.insert(key.clone(), place);
+                self.factors[place] = made;
+            }
+            None => {
+                self.places.insert(key.clone(), self.factors.len());
+                self.factors.push(made);
+            }
+        }
         Some(())
     }
 
@@ -210,9 +246,9 @@ impl FactorCache {
         &mut self,
         key: &FactorKey,
         body: &DeformableBody,
-        h: f64,
         symbolic: &Symbolic,
     ) -> Option<(Factor, CoarseInverse)> {
+        let h = key.h();
         if key.solver == Solver::ConjugateGradients {
             let operator = StiffnessOperator::new(&body.model, &body.material, &key.pins, key.system, h);
             let coarse = CoarseInverse { local: operator.local_compliance(), modes: None };

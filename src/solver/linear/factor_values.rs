@@ -31,6 +31,11 @@ impl Factor {
         matches!(self, Self::Jacobi(_) | Self::GaussSeidel(_))
     }
 
+    /// Whether it answers for the rigid motion of a stiff body to many digits.
+    pub fn is_accurate(&self) -> bool {
+        matches!(self, Self::Double(_) | Self::Iterative(_))
+    }
+
     pub fn bytes(&self) -> usize {
         match self {
             Self::Single(values) => size_of_val(values.as_slice()),

@@ -31,7 +31,7 @@ pub(crate) use block_matrix::{BlockFactor, BlockMatrix};
 pub(crate) use compliance_columns::ComplianceColumns;
 pub(crate) use factor::{FactorScratch, Symbolic};
 
-pub(crate) use factor_cache::{FactorCache, FactorId, SystemFactor};
+pub(crate) use factor_cache::{FactorCache, FactorId, STEPS_KEPT, SystemFactor};
 pub(crate) use preconditioner::Preconditioner;
 pub(crate) use system::{FactorKey, assemble_tangent};
 #[cfg(test)]

@@ -45,6 +45,17 @@ impl FactorKey {
         key
     }
 
+    /// The step \[s\] that the matrix is of.
+    pub fn h(&self) -> f64 {
+        f64::from_bits(self.bits[0])
+    }
+
+    /// Whether a factor of the other key differs by its step alone.
+    pub fn is_of_another_step(&self, other: &Self) -> bool {
+        let same = |k: &Self| (k.model, k.solver, k.system, k.precision, k.clusters, k.elasticity);
+        same(self) == same(other) && self.bits[1..] == other.bits[1..] && self.pins == other.pins
+    }
+
     /// The key of a body at a step of `h` \[s\], in the memory of another.
     pub fn update(&mut self, body: &DeformableBody, h: f64) {
         let m = &body.material;
