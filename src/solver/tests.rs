@@ -128,7 +128,7 @@ fn delassus_blocks_are_what_the_preconditioner_does() {
     ] {
         for near in [H, 1.2 * H, 0.85 * H] {
             let mut body = clustered_body(system, frames, pinned, clusters);
-            body.state.factor_base.note(near);
+            body.state.factor_base.note(near, &[]);
             let (cache, mut problem) = prepared_of(body);
             assert_eq!(problem.key.h(), near);
             assert_blocks(&mut problem, &cache, &format!("{system:?} {frames:?} {near}"));
@@ -167,7 +167,7 @@ fn rigid_motion_is_exact_with_the_matrix_of_another_step() {
         for near in [1.2 * H, 0.85 * H] {
             let mut body = clustered_body(system, Frames::Floating, false, 0);
             body.set_material(DeformableMaterial::new(1e5, 0.4).mass_damping(3.0)).unwrap();
-            body.state.factor_base.note(near);
+            body.state.factor_base.note(near, &[]);
             let turn = crate::math::rotation_from_vector(&Vec3::new(0.7, -0.4, 0.2));
             body.state.x.iter_mut().for_each(|x| *x = turn * *x);
             let mut cache = FactorCache::default();

@@ -75,9 +75,8 @@ impl BodyProblem {
         let n = body.state.x.len();
         let part = if self.is_second_order { SECOND_ORDER } else { 1.0 };
         let h = part * self.dt;
-        self.key.update(body, part * body.state.factor_base.step_near(self.dt));
-        self.key.pins.extend(self.prescribed.iter().map(|p| p.node));
-        self.key.pins.sort_unstable();
+        let near = part * body.state.factor_base.step_near(self.dt);
+        self.key.update(body, near, self.prescribed.iter().map(|p| p.node));
         self.settings = *body.settings();
         self.material = body.material;
         self.activation = body.activation;

@@ -246,7 +246,7 @@ impl Preconditioner {
             }
         }
         self.counters.solves += 1;
-        self.counters.solve_bytes += 2 * factor.factor.bytes();
+        self.counters.solve_bytes += 2 * factor.factor.solve_bytes();
         self.counters.linear_time += clock.lap();
     }
 
