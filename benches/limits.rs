@@ -138,7 +138,105 @@ fn memory(tets: usize, cells: usize) {
     );
 }
 
+/// Milliseconds that the step takes in which `count` vertices of a cube at rest on a floor are grabbed, of factors and
+/// columns: median, with the number of factorizations.
+fn grab(count: usize) -> (f64, usize) {
+    let mut physics = PhysicsWorld::new();
+    let floor = RigidBodyBuilder::fixed().translation(Vector::Y * -0.5);
+    physics.insert(floor, ColliderBuilder::cuboid(10.0, 0.5, 10.0).friction(0.5));
+    let mut world = DeformableWorld::new();
+    let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [8, 8, 6]).translation(Vector::Y * 0.2);
+    let cube = cube.material(DeformableMaterial::new(1e6, 0.4).friction(0.5)).can_sleep(false);
+    let cube = world.insert(cube).expect("a valid cube");
+    (0..40).for_each(|_| world.step(&mut physics));
+    let (mut times, mut made) = (Vec::new(), 0);
+    for k in 0..9 {
+        let vertices = world.bodies[cube].vertex_count();
+        let held: Vec<usize> = (0..count).map(|i| (k * 37 + i * 13) % vertices).collect();
+        held.iter().for_each(|&v| world.bodies[cube].pin(v).expect("a vertex"));
+        world.step(&mut physics);
+        times.push(world.counters().factor_time.as_secs_f64() * 1e3);
+        made += world.counters().factorizations;
+        (0..10).for_each(|_| world.step(&mut physics));
+        held.iter().for_each(|&v| world.bodies[cube].unpin(v).expect("a pinned vertex"));
+        (0..10).for_each(|_| world.step(&mut physics));
+    }
+    (median(times), made)
+}
+
+/// What grabbing takes, up to where a factor of its own is made.
+fn grabs() {
+    let results = [1, 4, 16, 17].map(|count| (count, grab(count)));
+    for (count, (ms, made)) in results {
+        println!(
+            "{count:>2} vertices grabbed of 1920 tets in contact: {ms:.1} ms, {made} factorizations in 9 grabs"
+        );
+    }
+    let [(_, (one, none)), .., (_, (many, all))] = results;
+    assert_eq!((none, all), (0, 9));
+    // 3.2 against 11.6 ms.
+    assert!(one < many / 1.3, "one vertex {one} ms, seventeen {many} ms");
+}
+
+/// A cube of so many cells that lands on a floor, or hangs in the air: how long insertion, the first step, the worst later
+/// one and a settled one take, and a solve \[s\].
+fn big(cells: usize, solver: Solver, hangs: bool) -> f64 {
+    let mut physics = PhysicsWorld::new();
+    let floor = RigidBodyBuilder::fixed().translation(Vector::Y * -0.5);
+    physics.insert(floor, ColliderBuilder::cuboid(10.0, 0.5, 10.0).friction(0.5));
+    let mut world = DeformableWorld::new();
+    let start = Instant::now();
+    let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [cells; 3])
+        .translation(Vector::Y * if hangs { 5.0 } else { 0.205 })
+        .material(DeformableMaterial::new(1e6, 0.4).mass_damping(1.0).friction(0.5))
+        .can_sleep(false)
+        .tune(|s| s.solver = solver);
+    let cube = if hangs { cube.pinned(|x| x.x < -0.199) } else { cube };
+    world.insert(cube).expect("a valid cube");
+    let insert = start.elapsed().as_secs_f64();
+    let (mut steps, mut solve, mut solves) = (Vec::new(), 0.0, 0);
+    for k in 0..40 {
+        let start = Instant::now();
+        world.step(&mut physics);
+        steps.push(start.elapsed().as_secs_f64());
+        if k > 0 {
+            solve += world.counters().linear_time.as_secs_f64();
+            solves += world.counters().solves;
+        }
+    }
+    let worst = steps[1..].iter().copied().fold(0.0, f64::max);
+    let settled = median(steps[30..].to_vec());
+    solve /= solves as f64;
+    println!(
+        "{:>6} tets, {solver:?}, {}: insert {insert:.2} s, first step {:.2} s, worst later {worst:.3} s, settled {settled:.4} s, a solve {:.2} ms, factor {:.0} MB",
+        5 * cells.pow(3),
+        if hangs { "hanging" } else { "landing" },
+        steps[0],
+        solve * 1e3,
+        world.counters().factor_bytes as f64 * 1e-6
+    );
+    solve
+}
+
+/// Up to 100 000 tetrahedra.
+fn bigs() {
+    for cells in [9, 14, 20, 27] {
+        big(cells, Solver::Projective, false);
+        let by_factor = big(cells, Solver::Projective, true);
+        let by_iteration = big(cells, Solver::ConjugateGradients, true);
+        // 48 to 80 times at 4000 to 14000 tets, 25 at 98415.
+        assert!(by_iteration > 8.0 * by_factor, "{cells}: {by_iteration} s, {by_factor} s");
+    }
+}
+
 fn main() {
+    let asked = |name: &str| std::env::args().any(|arg| arg == name);
+    if asked("grab") {
+        return grabs();
+    }
+    if asked("big") {
+        return in_pool(1, bigs);
+    }
     energies();
     println!("one thread: elements and solves");
     in_pool(1, || {

@@ -1,6 +1,7 @@
 //! One deformable body as its user sees it.
 
 use super::constraint_memory::ConstraintMemory;
+use super::factor_base::FactorBase;
 use super::settings::SolverSettings;
 use super::state::{DeformableState, History, Sleep};
 use crate::error::BodyError;
@@ -67,6 +68,7 @@ impl DeformableBody {
             shared: Vec::new(),
             history: History::default(),
             sleep: Sleep::default(),
+            factor_base: FactorBase::default(),
         };
         Self {
             model,

@@ -5,6 +5,7 @@
 //! nodes are renumbered for locality, and only the model translates.
 
 mod constraint_memory;
+mod factor_base;
 mod handle;
 mod settings;
 mod state;

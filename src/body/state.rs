@@ -1,6 +1,7 @@
 //! What changes while a body moves.
 
 use super::constraint_memory::{ConstraintKey, ConstraintMemory};
+use super::factor_base::FactorBase;
 use super::handle::DeformableBodyHandle;
 use crate::math::{Pose64, Vec3};
 
@@ -20,6 +21,7 @@ pub struct DeformableState {
     /// Where the last step began, of bodies that go forward by two.
     pub(crate) history: History,
     pub(crate) sleep: Sleep,
+    pub(crate) factor_base: FactorBase,
 }
 
 /// The state before the last step; empty where no step can go on from it.
@@ -54,14 +56,12 @@ pub(crate) struct Surroundings {
     /// The next of the bodies that fell asleep together, because they touched, in a ring.
     pub mate: Option<DeformableBodyHandle>,
     pub gravity: Vec3,
-    /// Length of the step \[s\].
-    pub dt: f64,
 }
 
 impl Surroundings {
     /// Whether the things around are those of another time.
     pub fn is_around(&self, other: &Self) -> bool {
-        self.obstacles == other.obstacles && self.gravity == other.gravity && self.dt == other.dt
+        self.obstacles == other.obstacles && self.gravity == other.gravity
     }
 }
 

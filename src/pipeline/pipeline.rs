@@ -88,10 +88,11 @@ impl DeformablePipeline {
             return Err(DeformableBodyError::TimeStep { dt: h });
         }
         for (_, body) in deformables.iter().filter(|(_, b)| b.is_enabled()) {
-            self.scratch.factors.prepare_surface(&FactorKey::new(body, h), body, h);
+            let near = body.state.factor_base.step_near(h);
+            self.scratch.factors.prepare_surface(&FactorKey::new(body, near), body);
             if body.settings().integrator == Integrator::Bdf2 {
-                let h = SECOND_ORDER * h;
-                self.scratch.factors.prepare(&FactorKey::new(body, h), body, h, std::iter::empty());
+                let key = FactorKey::new(body, SECOND_ORDER * near);
+                self.scratch.factors.prepare(&key, body, 1, std::iter::empty());
             }
         }
         Ok(())

@@ -33,4 +33,4 @@ pub(crate) use constraints::{
     Articulation, ContactLimits, Reaction, RigidProxies, RigidProxy, SolveContext, Twist,
 };
 pub(crate) use island::{Island, IslandReport, ROUNDING};
-pub(crate) use linear::{FactorCache, FactorId, FactorKey};
+pub(crate) use linear::{FactorCache, FactorId, FactorKey, STEPS_KEPT};

@@ -5,6 +5,7 @@ use super::scratch::StepScratch;
 use crate::body::DeformableBodySet;
 use crate::contact::Endpoint;
 use crate::coupling::StepContext;
+use crate::solver::STEPS_KEPT;
 
 impl StepScratch {
     /// Bodies that are touched go on by implicit Euler.
@@ -29,12 +30,13 @@ impl StepScratch {
                 return false;
             };
             // Numbers beyond what double precision can factor: stiffness over inertia of 1e15 and more.
-            let Some(done) = factors.prepare(&problem.key, body, problem.h(), work.touched_nodes()) else {
+            let steps = if body.state.factor_base.is_apart(problem.dt()) { STEPS_KEPT } else { 1 };
+            let Some(done) = factors.prepare(&problem.key, body, steps, work.touched_nodes()) else {
                 quarantine(body, counters);
                 return false;
             };
             counters.factorizations += done.factorizations;
-            counters.columns += done.columns + factors.prepare_ahead(done.id, &problem.key.pins, &work.ahead);
+            counters.columns += done.columns + factors.prepare_ahead(done.id, &work.ahead);
             work.set_factor(done.id, done.has_columns);
             true
         });

@@ -86,6 +86,7 @@ pub(super) fn store(
         history.x.clone_from(x);
         history.v.clone_from(v);
     }
+    body.state.factor_base.note(h, &problem.key.base);
     let in_flight = work.island.contacts.active() == 0;
     problem.final_velocities(in_flight, &mut body.state.v);
     body.state.x.clone_from(&problem.current.x);

@@ -110,7 +110,7 @@ impl Sleeping {
             self.now.obstacles.push((obstacle.key, obstacle.part, obstacle.start));
         }
         self.now.obstacles.sort_unstable_by_key(|(key, part, _)| (*key, *part));
-        (self.now.gravity, self.now.dt) = (context.gravity, context.h);
+        self.now.gravity = context.gravity;
     }
 
     /// Lets an island fall asleep of which every part has been still for long enough.

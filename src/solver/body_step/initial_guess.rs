@@ -73,9 +73,15 @@ impl BodyProblem {
             SystemMatrix::RestStiffness => self.preconditioner.set_floating(turned),
         }
         if is_free && factor.factor.is_rough() {
-            self.preconditioner.deflate(&self.masses, mobility, factor);
-        } else {
-            self.preconditioner.set_clusters(factor, &self.current.x);
+            return self.preconditioner.deflate(&self.masses, mobility, factor);
+        }
+        self.preconditioner.set_clusters(factor, &self.current.x);
+        if is_free && self.key.h() != self.h && factor.factor.is_accurate() {
+            let (rest, mobilities) = (&self.model.rest, [mobility, self.mobility_of(self.key.h())]);
+            // What is thin is in the matrix as multiples of the identity.
+            let is_thin = !(self.model.triangles.is_empty() && self.model.stencils.is_empty());
+            let resists = is_thin || factor.system == SystemMatrix::Laplacian;
+            self.preconditioner.correct_rigid_motion(rest, &self.masses, mobilities, resists);
         }
     }
 

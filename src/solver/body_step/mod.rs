@@ -2,6 +2,7 @@
 
 mod problem;
 
+mod begin;
 mod finish;
 mod initial_guess;
 mod newton_factors;

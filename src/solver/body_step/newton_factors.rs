@@ -91,7 +91,7 @@ impl NewtonFactors {
         self.count += 1;
         Some(SystemFactor {
             symbolic: symbolic.clone(),
-            factor,
+            factor: std::sync::Arc::new(factor),
             system: SystemMatrix::RestStiffness,
             columns,
             clusters: None,

@@ -4,7 +4,7 @@
 //! `s = x_n + h v_n + h² M⁻¹ f_ext` [Bouaziz et al. 2014], E the elastic energy with the stiffness
 //! damping of the step. The residual is `r = −∂Ψ/∂x` \[N\]; pinned nodes are not unknowns.
 
-use crate::body::{DeformableBody, Integrator, PrescribedNode, SolverSettings};
+use crate::body::{PrescribedNode, SolverSettings};
 use crate::fem::elastic_forces::{Evaluation, StiffnessDamping};
 use crate::fem::{DeformableModel, Elements, elastic_forces};
 use crate::material::DeformableMaterial;
@@ -12,7 +12,6 @@ use crate::math::{
     Mat3, Vec3, centre_of_mass, inertia_about, rotation_from_vector, skew, solve_semidefinite,
 };
 use crate::profiler::timed;
-use crate::solver::counters::SolveCounters;
 use crate::solver::linear::{FactorId, FactorKey, Preconditioner, SystemFactor};
 use std::sync::Arc;
 
@@ -33,7 +32,7 @@ pub(crate) struct BodyProblem {
     pub settings: SolverSettings,
     pub(super) material: DeformableMaterial,
     pub(super) activation: f64,
-    /// The step that the matrix is of \[s\], and that by which time goes on.
+    /// The step that the objective is of \[s\], and that by which time goes on.
     pub(super) h: f64,
     pub(super) dt: f64,
     /// Goes forward by two steps.
@@ -88,117 +87,6 @@ pub(crate) struct Iterate {
 }
 
 impl BodyProblem {
-    /// Of a body at the start of a step of `h` \[s\] under `gravity` [m/s²], with the nodes that attachments prescribe.
-    pub fn new(body: &DeformableBody, h: f64, gravity: &Vec3, prescribed: &[PrescribedNode]) -> Self {
-        let n = body.state.x.len();
-        let mut problem = Self {
-            key: FactorKey::new(body, h),
-            factor: FactorId::default(),
-            has_columns: false,
-            model: body.model.clone(),
-            settings: *body.settings(),
-            material: body.material,
-            activation: body.activation,
-            h,
-            dt: h,
-            is_second_order: false,
-            x_start: Vec::new(),
-            v_start: Vec::new(),
-            spin: Vec3::zeros(),
-            target: Vec::new(),
-            masses: Vec::new(),
-            damping: StiffnessDamping::default(),
-            current: Iterate::default(),
-            trial: Iterate::default(),
-            contact_force: vec![Vec3::zeros(); n],
-            contact_change: Vec::new(),
-            preconditioner: Preconditioner::default(),
-            step_damping: 1.0,
-            guard_retries: 0,
-            is_rejected: false,
-            weight: 0.0,
-            step: vec![Vec3::zeros(); n],
-            force: Vec::new(),
-            frame: Mat3::identity(),
-            prescribed: Vec::new(),
-            pinned_inertia: Vec::new(),
-        };
-        problem.begin(body, h, gravity, prescribed);
-        problem
-    }
-
-    /// As [`BodyProblem::new`], in the memory of an earlier step.
-    pub fn begin(&mut self, body: &DeformableBody, h: f64, gravity: &Vec3, prescribed: &[PrescribedNode]) {
-        // What its user has pinned stays there.
-        let is_free =
-            |node: &&PrescribedNode| body.pins.binary_search_by_key(&node.node, |p| p.node).is_err();
-        self.prescribed.clear();
-        self.prescribed.extend(prescribed.iter().filter(is_free));
-        self.prescribed.sort_unstable_by_key(|p| (p.node, p.attachment));
-        self.prescribed.dedup_by_key(|p| p.node);
-        let history = &body.state.history;
-        let continues = history.h == h && history.x.len() == body.state.x.len();
-        self.is_second_order = continues && body.settings().integrator == Integrator::Bdf2;
-        self.dt = h;
-        self.read_body(body, gravity);
-    }
-
-    /// Begins again by implicit Euler, if it had not been so: the body is touched.
-    pub fn begin_first_order(&mut self, body: &DeformableBody, gravity: &Vec3) {
-        if self.is_second_order {
-            self.is_second_order = false;
-            self.read_body(body, gravity);
-        }
-    }
-
-    fn read_body(&mut self, body: &DeformableBody, gravity: &Vec3) {
-        let n = body.state.x.len();
-        let h = if self.is_second_order { SECOND_ORDER * self.dt } else { self.dt };
-        self.key.update(body, h);
-        self.key.pins.extend(self.prescribed.iter().map(|p| p.node));
-        self.key.pins.sort_unstable();
-        self.settings = *body.settings();
-        self.material = body.material;
-        self.activation = body.activation;
-        self.h = h;
-        self.step_damping = 1.0;
-        self.guard_retries = 0;
-        self.is_rejected = false;
-        self.preconditioner.counters = SolveCounters::default();
-        self.x_start.clone_from(&body.state.x);
-        self.v_start.clone_from(&body.state.v);
-        self.spin = Vec3::from(body.angular_momentum());
-        if self.is_second_order {
-            let history = &body.state.history;
-            let starts = self.x_start.iter_mut().zip(&history.x);
-            starts.chain(self.v_start.iter_mut().zip(&history.v)).for_each(|(now, before)| {
-                *now += (*now - before) / 3.0;
-            });
-        }
-        self.masses.clear();
-        self.masses.extend((0..n).map(|i| body.node_mass(i)));
-        let g = gravity * body.gravity_scale();
-        self.target.clear();
-        let to_target = |i: usize| {
-            let acceleration = g + body.forces.get(i).map_or(Vec3::zeros(), |f| f / self.masses[i]);
-            self.x_start[i] + self.v_start[i] * h + acceleration * (h * h)
-        };
-        self.target.extend((0..n).map(to_target));
-        self.pinned_inertia.clear();
-        self.pinned_inertia.extend(self.key.pins.iter().map(|&p| self.target[p as usize]));
-        let pins = body.pins.iter().map(|pin| (pin.node, pin.target));
-        for (node, target) in pins.chain(self.prescribed.iter().map(|p| (p.node, p.target))) {
-            self.target[node as usize] = target;
-        }
-        self.contact_force.clear();
-        self.contact_force.resize(n, Vec3::zeros());
-        self.step.resize(n, Vec3::zeros());
-        let before = self.is_second_order.then_some(&body.state.history.x[..]);
-        self.damping.begin(&self.model, self.material.stiffness_damping, h, &body.state.x, before);
-        let mass = self.masses.iter().sum::<f64>();
-        self.weight = mass * g.norm() / n as f64;
-    }
-
     /// What is elastic in the body.
     pub fn elements(&self) -> Elements<'_> {
         Elements { model: &self.model, material: &self.material, activation: self.activation }
@@ -215,12 +103,22 @@ impl BodyProblem {
 
     /// Displacement per force over mass of a rigid body, h²/(1 + αh) [s²].
     pub fn mobility(&self) -> f64 {
-        self.h * self.h / (1.0 + self.material.mass_damping * self.h)
+        self.mobility_of(self.h)
     }
 
-    /// The step \[s\] that the matrix is of.
+    /// As [`BodyProblem::mobility`], in a step of `h` \[s\].
+    pub(super) fn mobility_of(&self, h: f64) -> f64 {
+        h * h / (1.0 + self.material.mass_damping * h)
+    }
+
+    /// The step \[s\] that the objective is of.
     pub fn h(&self) -> f64 {
         self.h
+    }
+
+    /// The step \[s\] by which time goes on.
+    pub fn dt(&self) -> f64 {
+        self.dt
     }
 
     /// Sets the trial to `x + P(r + Jᵀλ⁰)/c`.

@@ -229,7 +229,8 @@ impl Between<'_> {
         let has_one_frame = body.preconditioner.one_frame().is_some();
         let pairs = (0..*n).flat_map(|l| (0..*m).map(move |k| (k, l)));
         let block = |(k, l): (usize, usize)| {
-            let mut block = factor.columns.block(places[k], places_b[l]);
+            let (on, at) = ([places[k], places_b[l]], [nodes[k], nodes_b[l]]);
+            let mut block = body.preconditioner.inverse_block(factor, on, at);
             if !has_one_frame {
                 block = body.preconditioner.compliance(factor, &block, nodes[k], nodes_b[l]);
             }

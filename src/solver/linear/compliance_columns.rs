@@ -3,11 +3,13 @@
 //! Of each column only the rows of surface nodes are kept. Blocks are in the rest frame; frames
 //! rotate them.
 
+use super::changed_pins::ChangedPins;
 use super::coefficients::dimension;
 use super::factor::{BATCH, FactorScratch, Symbolic};
 use super::factor_values::Factor;
 use crate::fem::{DeformableModel, SystemMatrix};
 use crate::math::Mat3;
+use crate::math::lanes::Lane;
 use crate::mesh::Surface;
 
 /// Batches that go through the factor together.
@@ -78,6 +80,42 @@ impl ComplianceColumns {
         }
         self.made += missing.len();
         missing.len()
+    }
+
+    /// As [`ComplianceColumns::prepare`], for changed pins from the columns of their base, which are there.
+    pub fn derive(
+        &mut self,
+        model: &DeformableModel,
+        pins: &[u32],
+        places: &[usize],
+        base: &Self,
+        change: &ChangedPins,
+        surface_nodes: &[u32],
+    ) -> usize {
+        let (d, nodes, made) = (self.d, &model.surface.nodes, self.made);
+        let is_pinned = |s: usize| pins.binary_search(&nodes[s]).is_ok();
+        let place = |s: usize| places[nodes[s] as usize];
+        let (mut share, mut there) = (vec![Lane::default(); nodes.len()], Vec::new());
+        for &s in surface_nodes {
+            let s = s as usize;
+            let (None, Some(column)) = (&self.columns[s], &base.columns[s]) else { continue };
+            if there.is_empty() {
+                there = change.at((0..nodes.len()).map(place));
+            }
+            let mut column = column.clone();
+            for (c, column) in column.chunks_exact_mut(d * nodes.len()).enumerate() {
+                change.share(place(s), c, &there, &mut share);
+                for (i, (block, share)) in column.chunks_exact_mut(d).zip(&share).enumerate() {
+                    block.iter_mut().zip(share.0).for_each(|(v, more)| *v += more);
+                    if is_pinned(s) || is_pinned(i) {
+                        block.fill(0.0);
+                    }
+                }
+            }
+            self.columns[s] = Some(column);
+            self.made += 1;
+        }
+        self.made - made
     }
 
     /// The 3×3 block of `A⁻¹` between two surface nodes whose columns were prepared. Symmetric to

@@ -6,6 +6,7 @@
 use super::factor_values::{Factor, NotPositiveDefinite};
 use super::operator::ConjugateScratch;
 use super::supernodes::{Entry, Supernodes};
+use crate::math::lanes::Lane;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::matmul;
@@ -46,6 +47,7 @@ pub(crate) struct FactorScratch {
     pub(super) ordered: Vec<f64>,
     gathered: Vec<f64>,
     panel: Vec<f64>,
+    pub(super) given: Vec<Lane>,
     pub(super) conjugate: ConjugateScratch,
 }
 
@@ -156,6 +158,9 @@ impl Symbolic {
     pub fn solve_batch(&self, factor: &Factor, rhs: &mut [f64], scratch: &mut FactorScratch) {
         let d = self.d;
         let n = d * self.order.len();
+        if let Factor::Changed(change) = factor {
+            return change.solve_batch(self, rhs, scratch);
+        }
         if !matches!(factor, Factor::Double(_) | Factor::Single(_)) {
             for column in rhs.chunks_exact_mut(n).filter(|c| c.iter().any(|v| *v != 0.0)) {
                 self.solve_without(factor, column, scratch);
@@ -326,7 +331,6 @@ pub(crate) fn subtract_product(C: &mut [f64], A: &[f64], B: &[f64], [p, q, r]: [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::lanes::Lane;
     use proptest::prelude::*;
 
     proptest! {

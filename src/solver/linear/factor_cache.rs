@@ -4,6 +4,7 @@
 //! an old one; it only takes longer.
 
 use super::affine_modes::CoarseInverse;
+use super::changed_pins::ChangedPins;
 use super::clusters::Clusters;
 use super::coefficients::{dimension, stiffening};
 use super::compliance_columns::ComplianceColumns;
@@ -21,7 +22,7 @@ use std::sync::Arc;
 /// A body's matrix, factored, with the columns of its inverse that contacts have asked for.
 pub(crate) struct SystemFactor {
     pub symbolic: Arc<Symbolic>,
-    pub factor: Factor,
+    pub factor: Arc<Factor>,
     pub system: SystemMatrix,
     pub columns: ComplianceColumns,
     pub clusters: Option<Clusters>,
@@ -31,11 +32,15 @@ pub(crate) struct SystemFactor {
 }
 
 /// A factor that is kept.
-struct Entry {
-    made: SystemFactor,
-    key: FactorKey,
-    model: Arc<DeformableModel>,
-    last_used: u64,
+pub(super) struct Entry {
+    pub made: SystemFactor,
+    pub key: FactorKey,
+    pub model: Arc<DeformableModel>,
+    pub last_used: u64,
+    /// The same for all factors that differ by their step alone.
+    pub family: u64,
+    /// Serial of the factor that it is made from.
+    base: Option<u64>,
 }
 
 /// Where a cache keeps a factor, for the present step.
@@ -46,16 +51,17 @@ pub(crate) struct FactorId(usize);
 #[derive(Default)]
 pub(crate) struct FactorCache {
     /// By model, matrix, and whether it is put together.
-    symbolic: HashMap<(u64, SystemMatrix, bool), Arc<Symbolic>>,
-    factors: Vec<Entry>,
-    places: HashMap<FactorKey, usize>,
+    pub(super) symbolic: HashMap<(u64, SystemMatrix, bool), Arc<Symbolic>>,
+    pub(super) factors: Vec<Entry>,
+    pub(super) places: HashMap<FactorKey, usize>,
     scratch: FactorScratch,
-    ages: Vec<u64>,
+    /// Family, and step in which it was last used.
+    pub(super) ages: Vec<(u64, u64)>,
     /// \[bytes\]; and what the bodies of this step have asked for so far.
     column_budget: usize,
     columns_wanted: usize,
     nodes: Vec<u32>,
-    step: u64,
+    pub(super) step: u64,
     made: u64,
 }
 
@@ -77,11 +83,6 @@ const FEW_NODES: usize = 64;
 /// Operations of an iterative solve per node, over those of a number of a factor.
 const ITERATIVE: usize = 3000;
 
-/// Steps after which an unused factor is dropped: two seconds at game speed.
-const UNUSED_STEPS: u64 = 120;
-/// Unused factors that are kept at all.
-const MAX_UNUSED: usize = 8;
-
 impl FactorCache {
     /// Starts a step: forgets factors that nobody used for a while, and, least recently used first,
     /// columns beyond the budget \[bytes\].
@@ -89,17 +90,7 @@ impl FactorCache {
         self.step += 1;
         self.column_budget = column_budget;
         self.columns_wanted = 0;
-        let oldest = self.step.saturating_sub(UNUSED_STEPS);
-        self.forget_before(oldest);
-        // A material or a step that changes all the time must not fill the memory with old factors.
-        let now = self.step;
-        self.ages.clear();
-        self.ages.extend(self.factors.iter().map(|f| f.last_used).filter(|used| used + 1 < now));
-        if self.ages.len() > MAX_UNUSED {
-            self.ages.sort_unstable();
-            let cutoff = self.ages[self.ages.len() - MAX_UNUSED];
-            self.forget_before(cutoff);
-        }
+        self.forget_unused();
         while self.column_bytes() > column_budget {
             let idle = |f: &&mut Entry| f.made.columns.bytes() > 0;
             let Some(oldest) = self.factors.iter_mut().filter(idle).min_by_key(|f| (f.last_used, f.model.id))
@@ -110,60 +101,88 @@ impl FactorCache {
         }
     }
 
-    /// Forgets factors that were last used before this step.
-    fn forget_before(&mut self, oldest: u64) {
-        if self.factors.iter().all(|f| f.last_used >= oldest) {
-            return;
-        }
-        self.factors.retain(|f| f.last_used >= oldest);
-        self.places.clear();
-        self.places.extend(self.factors.iter().enumerate().map(|(place, f)| (f.key.clone(), place)));
-        self.symbolic.retain(|(model, ..), _| self.factors.iter().any(|f| f.key.model == *model));
-    }
-
-    /// Makes sure the factor of a body and the inverse's columns at these surface nodes are there.
+    /// Makes sure the factor of a body and the inverse's columns at these surface nodes are there; `steps` factors of the
+    /// body may come to want such.
     /// `None` when the matrix is not positive definite in double precision.
     pub fn prepare(
         &mut self,
         key: &FactorKey,
         body: &DeformableBody,
-        h: f64,
+        steps: usize,
         surface_nodes: impl Iterator<Item = u32>,
     ) -> Option<CacheWork> {
         let mut work = CacheWork::default();
-        if !self.places.contains_key(key) {
-            self.make(key, body, h)?;
-            work.factorizations = 1;
+        if !self.is_there(key) {
+            work.factorizations = self.make(key, body)?;
         }
         work.id = FactorId(*self.places.get(key)?);
-        let entry = &mut self.factors[work.id.0];
-        entry.last_used = self.step;
+        let base = self.base_of(work.id.0);
+        let step = self.step;
+        base.iter().chain([&work.id.0]).for_each(|&place| self.factors[place].last_used = step);
         self.nodes.clear();
         self.nodes.extend(surface_nodes);
         self.nodes.sort_unstable();
         self.nodes.dedup();
-        let Entry { made: SystemFactor { symbolic, factor, columns, .. }, model, .. } = entry;
+        let Entry { made: SystemFactor { symbolic, factor, columns, .. }, model, .. } =
+            &self.factors[work.id.0];
         // Decided by what is asked for, not by what is there: a fresh cache comes to the same bits.
-        self.columns_wanted += columns.bytes_of(self.nodes.len());
+        let copies = steps * (1 + usize::from(base.is_some()));
+        self.columns_wanted += copies * columns.bytes_of(self.nodes.len());
         work.has_columns = columns_pay(symbolic, factor, model, self.nodes.len())
             && self.columns_wanted <= self.column_budget;
         if work.has_columns {
-            let nodes = self.nodes.iter().copied();
-            work.columns = columns.prepare(model, &key.pins, symbolic, factor, nodes, &mut self.scratch);
+            work.columns = self.make_columns(work.id);
         }
         Some(work)
     }
 
     /// Makes a body's factor, and the columns of all of its surface if few contacts pay for theirs; as [`Self::prepare`].
-    pub fn prepare_surface(&mut self, key: &FactorKey, body: &DeformableBody, h: f64) -> Option<CacheWork> {
-        let mut work = self.prepare(key, body, h, std::iter::empty())?;
-        let Entry { made: SystemFactor { symbolic, factor, columns, .. }, model, .. } =
-            &mut self.factors[work.id.0];
+    pub fn prepare_surface(&mut self, key: &FactorKey, body: &DeformableBody) -> Option<CacheWork> {
+        let mut work = self.prepare(key, body, 1, std::iter::empty())?;
+        let Entry { made: SystemFactor { symbolic, factor, .. }, model, .. } = &self.factors[work.id.0];
         let all = 0..model.surface.nodes.len() as u32;
         if columns_pay(symbolic, factor, model, FEW_NODES.min(all.len())) {
-            work.columns = columns.prepare(model, &key.pins, symbolic, factor, all, &mut self.scratch);
+            self.nodes.clear();
+            self.nodes.extend(all);
+            work.columns = self.make_columns(work.id);
         }
         Some(work)
+    }
+
+    /// Whether a factor is there, with the one that it is made from.
+    fn is_there(&self, key: &FactorKey) -> bool {
+        let Some(&place) = self.places.get(key) else { return false };
+        self.factors[place].base.is_none() || self.base_of(place).is_some()
+    }
+
+    /// Place of the factor that another is made from.
+    fn base_of(&self, place: usize) -> Option<usize> {
+        let serial = self.factors[place].base?;
+        self.factors.iter().position(|f| f.made.serial == serial)
+    }
+
+    /// Makes the columns of `nodes` that are not there; returns how many.
+    fn make_columns(&mut self, id: FactorId) -> usize {
+        let base = self.base_of(id.0);
+        if base.is_some() {
+            let own = &self.factors[id.0].made.columns;
+            self.nodes.retain(|s| !own.has(*s));
+            if self.nodes.is_empty() {
+                return 0;
+            }
+        }
+        let nodes = || self.nodes.iter().copied();
+        let own = &mut self.factors[base.unwrap_or(id.0)];
+        let SystemFactor { symbolic, factor, columns, .. } = &mut own.made;
+        let made = columns.prepare(&own.model, &own.key.pins, symbolic, factor, nodes(), &mut self.scratch);
+        let Some(base) = base else { return made };
+        let Ok([own, base]) = self.factors.get_disjoint_mut([id.0, base]) else { return made };
+        let Entry { made: SystemFactor { symbolic, factor, columns, .. }, model, key, .. } = own;
+        if let Factor::Changed(change) = &**factor {
+            let places = symbolic.places();
+            columns.derive(model, &key.pins, places, &base.made.columns, change, &self.nodes);
+        }
+        made
     }
 
     /// The pattern of a body's matrix, made once per model.
@@ -182,27 +201,92 @@ impl FactorCache {
         Some(made)
     }
 
-    /// Makes and keeps the factor of a body.
-    fn make(&mut self, key: &FactorKey, body: &DeformableBody, h: f64) -> Option<()> {
+    /// Makes and keeps the factor of a body; returns how many factorizations that took.
+    fn make(&mut self, key: &FactorKey, body: &DeformableBody) -> Option<usize> {
+        if key.base == key.pins {
+            return self.make_from(key, body, None).map(|()| 1);
+        }
+        let base = key.of_base();
+        let has_base = self.places.contains_key(&base);
+        if !has_base {
+            self.make_from(&base, body, None)?;
+        }
+        let place = *self.places.get(&base)?;
+        self.factors[place].last_used = self.step;
+        let from = (self.factors[place].made.serial, self.factors[place].made.factor.clone());
+        if self.make_from(key, body, Some(from)).is_some() {
+            return Some(usize::from(!has_base));
+        }
+        // Rounding has left no definite matrix.
+        self.make_from(key, body, None)?;
+        Some(1 + usize::from(!has_base))
+    }
+
+    /// From the factor with this serial, or from nothing.
+    fn make_from(
+        &mut self,
+        key: &FactorKey,
+        body: &DeformableBody,
+        base: Option<(u64, Arc<Factor>)>,
+    ) -> Option<()> {
         let symbolic = self.pattern(key, body)?;
-        let (factor, coarse) = self.factor_of(key, body, h, &symbolic)?;
+        let serial_of_base = base.as_ref().map(|(serial, _)| *serial);
+        let (factor, coarse) = match base {
+            Some((_, base)) => self.changed(key, body, &symbolic, base)?,
+            None => self.factor_of(key, body, &symbolic)?,
+        };
         let columns = ComplianceColumns::new(&body.model.surface, key.system);
         let clusters = (key.clusters > 0).then(|| {
-            let weight = laplacian_weight(&body.material) * stiffening(&body.material, h);
+            let weight = laplacian_weight(&body.material) * stiffening(&body.material, key.h());
             let (pins, scratch) = (&key.pins, &mut self.scratch);
             Clusters::new(&body.model, key.clusters, weight, pins, &symbolic, &factor, scratch)
         });
         let serial = self.made;
+        let factor = Arc::new(factor);
+        let related = self.factors.iter().find(|f| f.key.is_of_another_step(key));
+        let family = related.map_or(serial, |f| f.family);
         let made = Entry {
             made: SystemFactor { symbolic, factor, system: key.system, columns, clusters, coarse, serial },
             key: key.clone(),
             model: body.model.clone(),
             last_used: self.step,
+            family,
+            base: serial_of_base,
         };
         self.made += 1;
-        self.places.insert(key.clone(), self.factors.len());
-        self.factors.push(made);
+        self.keep(made);
         Some(())
+    }
+
+    /// In the place of one with the same key, of one that has outlived itself, or a new one.
+    fn keep(&mut self, made: Entry) {
+        let place = self.places.get(&made.key).copied().or_else(|| self.outlived(made.family));
+        let place = place.unwrap_or(self.factors.len());
+        if let Some(before) = self.factors.get(place) {
+            self.places.remove(&before.key);
+        }
+        self.places.insert(made.key.clone(), place);
+        match self.factors.get_mut(place) {
+            Some(entry) => *entry = made,
+            None => self.factors.push(made),
+        }
+    }
+
+    /// A factor for a few other pins.
+    fn changed(
+        &mut self,
+        key: &FactorKey,
+        body: &DeformableBody,
+        symbolic: &Symbolic,
+        base: Arc<Factor>,
+    ) -> Option<(Factor, CoarseInverse)> {
+        let assemble =
+            |pins: &[u32]| system::assemble(&body.model, &body.material, pins, key.system, key.h(), symbolic);
+        let coarse = CoarseInverse::new(&body.model, &key.pins, symbolic, &assemble(&key.pins));
+        let both: Vec<u32> = key.base.iter().copied().filter(|n| key.pins.binary_search(n).is_ok()).collect();
+        let pins = [&key.base[..], &key.pins[..]];
+        let change = ChangedPins::new(symbolic, base, pins, || assemble(&both), &mut self.scratch)?;
+        Some((Factor::Changed(Box::new(change)), coarse))
     }
 
     /// The numbers of a factor, or what the body's solver has in its place, and what they are near.
@@ -210,9 +294,9 @@ impl FactorCache {
         &mut self,
         key: &FactorKey,
         body: &DeformableBody,
-        h: f64,
         symbolic: &Symbolic,
     ) -> Option<(Factor, CoarseInverse)> {
+        let h = key.h();
         if key.solver == Solver::ConjugateGradients {
             let operator = StiffnessOperator::new(&body.model, &body.material, &key.pins, key.system, h);
             let coarse = CoarseInverse { local: operator.local_compliance(), modes: None };
@@ -241,15 +325,16 @@ impl FactorCache {
 
     /// Makes the columns of the first of these surface nodes that have none: one batch of them, so that
     /// a coming touch finds them there. Returns how many.
-    pub fn prepare_ahead(&mut self, id: FactorId, pins: &[u32], surface_nodes: &[u32]) -> usize {
-        let Entry { made, model, .. } = &mut self.factors[id.0];
-        let SystemFactor { symbolic, factor, columns, system, .. } = made;
+    pub fn prepare_ahead(&mut self, id: FactorId, surface_nodes: &[u32]) -> usize {
+        let Entry { made: SystemFactor { symbolic, factor, columns, system, .. }, model, .. } =
+            &self.factors[id.0];
         if !columns_pay(symbolic, factor, model, FEW_NODES) {
             return 0;
         }
         let missing = surface_nodes.iter().copied().filter(|s| !columns.has(*s));
-        let batch: Vec<u32> = missing.take(BATCH / dimension(*system)).collect();
-        columns.prepare(model, pins, symbolic, factor, batch.into_iter(), &mut self.scratch)
+        self.nodes.clear();
+        self.nodes.extend(missing.take(BATCH / dimension(*system)));
+        self.make_columns(id)
     }
 
     /// A factor that was prepared in this step.

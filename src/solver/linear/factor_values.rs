@@ -1,5 +1,6 @@
 //! The numbers of a factor, or of what stands in for one.
 
+use super::changed_pins::ChangedPins;
 use super::operator::StiffnessOperator;
 
 /// A numeric factor `A = L Lᵀ`. Solves are in double precision with either.
@@ -15,9 +16,19 @@ pub(crate) enum Factor {
     GaussSeidel(Vec<f64>),
     /// What the matrix does, for conjugate gradients.
     Iterative(Box<StiffnessOperator>),
+    /// A factor for other pins, and what differs.
+    Changed(Box<ChangedPins>),
 }
 
 impl Factor {
+    /// Bytes that a solve reads, once.
+    pub fn solve_bytes(&self) -> usize {
+        match self {
+            Self::Changed(change) => change.bytes() + change.base.bytes(),
+            own => own.bytes(),
+        }
+    }
+
     /// The same in single precision.
     pub fn rounded(self) -> Self {
         match self {
@@ -31,6 +42,11 @@ impl Factor {
         matches!(self, Self::Jacobi(_) | Self::GaussSeidel(_))
     }
 
+    /// Whether it answers for the rigid motion of a stiff body to many digits.
+    pub fn is_accurate(&self) -> bool {
+        matches!(self, Self::Double(_) | Self::Iterative(_))
+    }
+
     pub fn bytes(&self) -> usize {
         match self {
             Self::Single(values) => size_of_val(values.as_slice()),
@@ -38,6 +54,7 @@ impl Factor {
                 size_of_val(values.as_slice())
             }
             Self::Iterative(operator) => operator.bytes(),
+            Self::Changed(change) => change.bytes(),
         }
     }
 }

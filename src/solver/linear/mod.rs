@@ -6,6 +6,7 @@ mod supernodes;
 mod gauss_seidel;
 mod operator;
 
+mod changed_pins;
 mod factor_values;
 
 mod factor;
@@ -21,6 +22,7 @@ mod clusters;
 mod compliance_columns;
 
 mod factor_cache;
+mod unused_factors;
 
 mod rigid_mode;
 
@@ -35,6 +37,7 @@ pub(crate) use rigid_mode::rigid_mobility;
 pub(crate) use factor_cache::{FactorCache, FactorId, SystemFactor};
 pub(crate) use preconditioner::Preconditioner;
 pub(crate) use system::{FactorKey, assemble_tangent};
+pub(crate) use unused_factors::STEPS_KEPT;
 #[cfg(test)]
 pub(crate) use {
     operator::{ConjugateScratch, StiffnessOperator},

@@ -28,6 +28,9 @@ pub(crate) struct Preconditioner {
     per_node: Vec<Mat3>,
     deflation: Deflation,
     rigid: RigidMode,
+    /// What the matrix of another step lacks, or has too much, of how a free body moves rigidly.
+    drift: RigidMode,
+    drifts: bool,
     clusters: TurnedClusters,
     /// The clusters take part.
     turns: bool,
@@ -68,28 +71,29 @@ struct Deflation {
 }
 
 impl Preconditioner {
+    fn begin(&mut self, kind: FrameKind) {
+        self.kind = kind;
+        self.turns = false;
+        self.drifts = false;
+        self.deflation.active = false;
+    }
+
     /// The body keeps its shape.
     pub fn set_rigid(&mut self, x: &[Vec3], masses: &[f64], mobility: f64) {
-        self.kind = FrameKind::Rigid;
-        self.turns = false;
-        self.deflation.active = false;
+        self.begin(FrameKind::Rigid);
         self.rigid.set(x, masses, mobility);
     }
 
     /// The scalar matrix: no frames.
     pub fn set_isotropic(&mut self) {
-        self.kind = FrameKind::Isotropic;
-        self.turns = false;
+        self.begin(FrameKind::Isotropic);
         self.floating = Mat3::identity();
-        self.deflation.active = false;
     }
 
     /// One frame for the body.
     pub fn set_floating(&mut self, rotation: &Mat3) {
-        self.kind = FrameKind::Floating;
-        self.turns = false;
+        self.begin(FrameKind::Floating);
         self.floating = rounded_rotation(rotation, FRAME_BITS);
-        self.deflation.active = false;
     }
 
     /// Lets the clusters of the Laplacian turn along, if the factor has such, from where they are at `x`.
@@ -106,8 +110,9 @@ impl Preconditioner {
         // ‖R − Q‖ = 2√2 sin(θ/2).
         let differs = (rotation - self.floating).norm() > angle * std::f64::consts::SQRT_2;
         if differs {
-            let (before, active) = (self.floating, self.deflation.active);
+            let (before, active, drifts) = (self.floating, self.deflation.active, self.drifts);
             self.set_floating(rotation);
+            self.drifts = drifts;
             if active {
                 let turn = self.floating * before.transpose();
                 let d = &mut self.deflation;
@@ -121,6 +126,22 @@ impl Preconditioner {
         differs
     }
 
+    /// Lets a free body with one frame move rigidly as in its own step, by the matrix of another: `mobilities`
+    /// \[s²\] are `h²/(1 + αh)` of both. Matrices that resist no rotation of the shape at `rest` have that right too.
+    pub fn correct_rigid_motion(
+        &mut self,
+        rest: &[Vec3],
+        masses: &[f64],
+        mobilities: [f64; 2],
+        resists_rotation: bool,
+    ) {
+        self.drift.set(rest, masses, mobilities[0] - mobilities[1]);
+        if resists_rotation {
+            self.drift.hold_rotation();
+        }
+        self.drifts = true;
+    }
+
     /// One frame per node, of the elements at `x`; free bodies (without pins) get their
     /// translation mode back.
     pub fn set_per_node(
@@ -132,12 +153,10 @@ impl Preconditioner {
         is_free: bool,
         factor: &SystemFactor,
     ) {
-        self.kind = FrameKind::PerNode;
-        self.turns = false;
+        self.begin(FrameKind::PerNode);
         self.per_node.resize(x.len(), Mat3::zeros());
         node_rotations(model, x, &mut self.per_node);
         self.per_node.iter_mut().for_each(|q| *q = rounded_rotation(q, FRAME_BITS));
-        self.deflation.active = false;
         if is_free {
             self.deflate(masses, mobility, factor);
         }
@@ -152,6 +171,8 @@ impl Preconditioner {
         let (serial, before) = &self.deflation.made_from;
         if *serial == Some(factor.serial) && before == frames {
             self.deflation.active = true;
+            // The factor may be that of another step.
+            self.deflation.mobility = mobility;
             return;
         }
         let frames = frames.to_vec();
@@ -185,6 +206,9 @@ impl Preconditioner {
         }
         if !self.deflation.active {
             self.rotate_and_solve(factor, r, out);
+            if self.drifts {
+                self.drift.add_turned(&self.floating, r, out);
+            }
             if let Some(clusters) = factor.clusters.as_ref().filter(|_| self.turns) {
                 self.clusters.add(clusters, r, out);
             }
@@ -222,13 +246,14 @@ impl Preconditioner {
             }
         }
         self.counters.solves += 1;
-        self.counters.solve_bytes += 2 * factor.factor.bytes();
+        self.counters.solve_bytes += 2 * factor.factor.solve_bytes();
         self.counters.linear_time += clock.lap();
     }
 
-    /// Whether the body moves as P without more than frames around the inverse: no rigid shape, no deflation.
+    /// Whether the body moves as P without more than frames around the inverse: no rigid shape, no deflation, nothing of
+    /// another step.
     pub fn is_framed(&self) -> bool {
-        self.kind != FrameKind::Rigid && !self.deflation.active
+        self.kind != FrameKind::Rigid && !self.deflation.active && !self.drifts
     }
 
     /// The frame of a node.
@@ -240,7 +265,13 @@ impl Preconditioner {
         }
     }
 
-    /// The block of P between two surface nodes, given the one of `A⁻¹` [m/N].
+    /// The block of the inverse between two nodes in the frame of the matrix [m/N], by their `places` on the surface.
+    pub fn inverse_block(&self, factor: &SystemFactor, places: [usize; 2], nodes: [usize; 2]) -> Mat3 {
+        let block = factor.columns.block(places[0], places[1]);
+        if self.drifts { block + self.drift.compliance(nodes[0], nodes[1]) } else { block }
+    }
+
+    /// The block of P between two surface nodes, given the one of the inverse [m/N].
     pub fn compliance(&self, factor: &SystemFactor, inverse_block: &Mat3, i: usize, j: usize) -> Mat3 {
         if self.kind == FrameKind::Rigid {
             return self.rigid.compliance(i, j);

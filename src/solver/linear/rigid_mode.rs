@@ -41,6 +41,24 @@ impl RigidMode {
         }
     }
 
+    /// Turns no more.
+    pub fn hold_rotation(&mut self) {
+        self.by_moment = Mat3::zeros();
+    }
+
+    /// Adds the displacements \[m\] of forces \[N\] on the nodes, of the body turned by `frame`.
+    pub fn add_turned(&self, frame: &Mat3, forces: &[Vec3], out: &mut [Vec3]) {
+        let (mut force, mut moment) = (Vec3::zeros(), Vec3::zeros());
+        for (f, arm) in forces.iter().zip(&self.arms) {
+            force += f;
+            moment += arm.cross(&frame.tr_mul(f));
+        }
+        let (shift, turn) = (force * self.by_force, frame * (self.by_moment * moment));
+        for (out, arm) in out.iter_mut().zip(&self.arms) {
+            *out += shift + turn.cross(&(frame * arm));
+        }
+    }
+
     /// The block between two nodes [m/N].
     pub fn compliance(&self, i: usize, j: usize) -> Mat3 {
         Mat3::from_diagonal_element(self.by_force)

@@ -17,6 +17,14 @@ impl Symbolic {
         match factor {
             Factor::Double(values) => self.supernodes.solve(values, x),
             Factor::Single(values) => self.supernodes.solve(values, x),
+            Factor::Changed(change) => {
+                let mut given = std::mem::take(&mut scratch.given);
+                given.clear();
+                given.extend_from_slice(x);
+                self.solve(&change.base, x, scratch);
+                change.correct(&given, x);
+                scratch.given = given;
+            }
             _ => {
                 let mut own = std::mem::take(&mut scratch.ordered);
                 // Axes of one right-hand side, and right-hand sides.
@@ -41,7 +49,7 @@ impl Symbolic {
     /// Without a factor, in the unknowns' own order.
     pub(super) fn solve_without(&self, factor: &Factor, x: &mut [f64], scratch: &mut FactorScratch) {
         match factor {
-            Factor::Double(_) | Factor::Single(_) => {}
+            Factor::Double(_) | Factor::Single(_) | Factor::Changed(_) => {}
             Factor::Jacobi(inverse) => x.iter_mut().zip(inverse).for_each(|(x, d)| *x *= d),
             Factor::GaussSeidel(values) => self.upper(values).sweep(x),
             Factor::Iterative(operator) => operator.solve(x, &mut scratch.conjugate),

@@ -25,8 +25,9 @@ pub(crate) struct FactorKey {
     elasticity: crate::energy::Elasticity,
     /// Bits of h, E, ν, ρ, α, β, and the modulus of fibres.
     bits: [u64; 7],
-    /// Pinned nodes, ascending.
+    /// Pinned nodes, ascending; and those of the factor that this one is made from, the same if it is not made from another.
     pub pins: Vec<u32>,
+    pub base: Vec<u32>,
 }
 
 impl FactorKey {
@@ -40,13 +41,33 @@ impl FactorKey {
             elasticity: body.material.elasticity,
             bits: [0; 7],
             pins: Vec::new(),
+            base: Vec::new(),
         };
-        key.update(body, h);
+        key.update(body, h, std::iter::empty());
         key
     }
 
-    /// The key of a body at a step of `h` \[s\], in the memory of another.
-    pub fn update(&mut self, body: &DeformableBody, h: f64) {
+    /// The step \[s\] that the matrix is of.
+    pub fn h(&self) -> f64 {
+        f64::from_bits(self.bits[0])
+    }
+
+    /// Whether a factor of the other key differs by its step alone.
+    pub fn is_of_another_step(&self, other: &Self) -> bool {
+        let same = |k: &Self| (k.model, k.solver, k.system, k.precision, k.clusters, k.elasticity);
+        same(self) == same(other)
+            && self.bits[1..] == other.bits[1..]
+            && self.pins == other.pins
+            && self.base == other.base
+    }
+
+    /// The key of the factor that this one is made from.
+    pub fn of_base(&self) -> Self {
+        Self { pins: self.base.clone(), ..self.clone() }
+    }
+
+    /// The key of a body at a step of `h` \[s\] with further nodes pinned, in the memory of another.
+    pub fn update(&mut self, body: &DeformableBody, h: f64, further: impl Iterator<Item = u32>) {
         let m = &body.material;
         let [e, nu, rho] = [m.youngs_modulus, m.poisson_ratio, m.density];
         self.model = body.model.id;
@@ -63,7 +84,13 @@ impl FactorKey {
         self.elasticity = m.elasticity;
         self.bits = [h, e, nu, rho, m.mass_damping, m.stiffness_damping, m.fibre_modulus].map(f64::to_bits);
         self.pins.clear();
-        self.pins.extend(body.pins.iter().map(|p| p.node));
+        self.pins.extend(body.pins.iter().map(|p| p.node).chain(further));
+        self.pins.sort_unstable();
+        let base = &body.state.factor_base;
+        // What only stands in for a factor is made as quickly.
+        let serves = self.solver == Solver::Projective && base.serves(&self.pins);
+        self.base.clear();
+        self.base.extend_from_slice(if serves { base.pins() } else { &self.pins });
     }
 }
 
