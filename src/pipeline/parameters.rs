@@ -43,7 +43,7 @@ impl Default for DeformableParameters {
             max_corrective_velocity: 1.0,
             restitution_threshold: 0.5,
             neighbourhood_bodies: 64,
-            contact_iterations: 150,
+            contact_iterations: 120,
             column_budget: 512 << 20,
         }
     }

@@ -4,6 +4,7 @@
 use super::context::SolveContext;
 use super::gaps::relative_motion;
 use super::system::ContactSystem;
+use super::without_matrix::PRODUCTS;
 use crate::contact::{Endpoint, Law};
 use crate::solver::body_step::{BodyProblem, Factors};
 use crate::solver::cone::{ConeTolerance, Effort};
@@ -22,8 +23,13 @@ const STILL_WORK: usize = 2_000_000_000;
 const STILL: f64 = 0.01;
 /// Factorizations of a solve by continuation, about.
 const SOLVE: usize = 15;
+/// Operations to make a number of W, with a frame per body and one per node, about.
+const MAKING: [usize; 2] = [10, 40];
+/// Operations of a product per body and per contact, besides four for every number of a factor, about.
+const PER_BODY: usize = 3000;
+const PER_CONTACT: usize = 2000;
 /// Newton's method is tried from the forces as they are where a factorization takes no more than so many iterations.
-const WARM_WORK: usize = 150;
+const WARM_WORK: usize = 120;
 /// Tries of that in a step that may fail.
 const WARM_FAILURES: usize = 2;
 /// Error of the last sweep from which on it is tried again.
@@ -54,10 +60,11 @@ impl ContactSystem {
         }
         let around = Around { factors, context, tolerance };
         self.measure(bodies, context);
-        if !bodies.iter().enumerate().all(|(i, b)| factors.has_columns(i, b)) {
+        let is_small = bodies.len() < CROWD;
+        let has_columns = bodies.iter().enumerate().all(|(i, b)| factors.has_columns(i, b));
+        if !has_columns || !is_small && self.products_pay(bodies, factors) {
             return self.improve_without_matrix(bodies, around);
         }
-        let is_small = bodies.len() < CROWD;
         let is_still = self.is_still(bodies, context.h);
         let work = if is_still || self.has_loads(context) { LOADED_WORK } else { LIGHT_WORK };
         let solve = SOLVE * self.groups.factor_work();
@@ -84,6 +91,17 @@ impl ContactSystem {
     fn has_loads(&self, context: &SolveContext<'_>) -> bool {
         let yields = |endpoint: &Endpoint| endpoint.proxy().is_some_and(|p| context.proxies.yields(p));
         self.constraints.iter().any(|constraint| constraint.endpoints.iter().any(yields))
+    }
+
+    /// Whether W would cost more than the products that go without it: where bodies are crushed into one another, each has
+    /// hundreds of contacts.
+    fn products_pay(&self, bodies: &[BodyProblem], factors: Factors<'_>) -> bool {
+        let has_one_frame = bodies.iter().all(|b| b.preconditioner.one_frame().is_some());
+        let making = MAKING[usize::from(!has_one_frame)] * self.groups.product_work();
+        let numbers: usize =
+            bodies.iter().enumerate().map(|(i, b)| factors.of(i, b).symbolic.factor_len()).sum();
+        let product = 4 * numbers + PER_BODY * bodies.len() + PER_CONTACT * self.active();
+        making > PRODUCTS[1] * product
     }
 
     /// Newton's method from the forces as they are, if a factorization is cheap and the last one was not in vain.

@@ -13,7 +13,7 @@ const SHIFT_ROUNDS: usize = 4;
 /// Part of a new shift that is taken from the second round on: whole ones swing to and fro in an impact.
 const SHIFT_BLEND: f64 = 0.5;
 /// Products of one solve, at least and at the most.
-const PRODUCTS: [usize; 2] = [2, 10];
+pub(super) const PRODUCTS: [usize; 2] = [2, 10];
 /// Iterations of the step's budget that a product, with the coarse problem before it, counts for.
 const PRODUCT_COST: usize = 2;
 /// Part of its first error that a solve leaves to the next outer iteration.
