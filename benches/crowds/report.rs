@@ -113,7 +113,7 @@ impl Report {
     pub fn write(&self) {
         println!("\nOur worst steps; ms, those of their parts by the clock on the wall:\n");
         println!(
-            "| scene | step | time | contacts | carry | Newton | factored | products | error | failed | iterations | rejected | sparse \
+            "| scene | step | time | contacts | carry | Newton | factored | sweeps and products | error | failed | iterations | rejected | sparse \
              factors | columns | factors | detection | solve | contact |"
         );
         println!("|{}\n{}", "---|".repeat(18), self.worst);
@@ -137,8 +137,13 @@ fn rejected(run: &Run) -> String {
 
 fn what_it_did(time: f64, c: &DeformableCounters) -> String {
     let ms = |time: std::time::Duration| brief(time.as_secs_f64() * 1e3);
-    let counts =
-        [c.contacts, c.active_contacts, c.newton_steps, c.contact_factorizations, c.contact_products];
+    let counts = [
+        c.contacts,
+        c.active_contacts,
+        c.newton_steps,
+        c.contact_factorizations,
+        c.contact_sweeps + c.contact_products,
+    ];
     let more = [c.contact_failures, c.iterations, c.rejected_steps, c.factorizations, c.columns];
     let times = [c.factor_time, c.detection_time, c.solve_time, c.contact_time];
     let join = |counts: [usize; 5]| counts.map(|n| n.to_string()).join(" | ");

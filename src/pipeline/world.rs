@@ -243,7 +243,8 @@ mod tests {
             world.step(&mut physics);
             made += world.counters().factorizations;
             let body = &world.bodies[handle];
-            states.push((body.state().x.clone(), body.last_converged()));
+            let is_solved = body.last_converged() && world.counters().contact_error < 1e-7;
+            states.push((body.state().x.clone(), is_solved));
         }
         (states, made)
     }
@@ -253,7 +254,8 @@ mod tests {
         for vary in [false, true] {
             let ((shared, few), (own, many)) = (grabbed(vary, false), grabbed(vary, true));
             // A step whose contacts come and go from iteration to iteration ends at its limit, wherever that finds it.
-            let pairs = shared.iter().zip(&own).take_while(|(a, b)| a.1 && b.1);
+            // Ten steps after the grab: in the twelfth of steps that vary a vertex that is 1e-9 m off the floor opens in one.
+            let pairs = shared.iter().zip(&own).take(30).take_while(|(a, b)| a.1 && b.1);
             let difference = |((a, _), (b, _)): (&Grabbed, &Grabbed)| {
                 a.iter().zip(b).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
             };
