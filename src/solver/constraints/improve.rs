@@ -17,7 +17,7 @@ const LIGHT_WORK: usize = 20_000_000;
 /// The same of what is still, or has rigid loads. A landing takes 1e7; what a thousand times its mass crushes at 1e3 Pa and 1/10 s takes 1.6e9,
 /// and at half of that ends below the floor.
 const LOADED_WORK: usize = 20_000_000_000;
-/// The same of crowds that are still: some 20 ms.
+/// The same of crowds that are still: some 100 ms.
 const STILL_WORK: usize = 2_000_000_000;
 /// Edges, per step, below which a body is still: what stands is to be solved to the last digit.
 const STILL: f64 = 0.01;
