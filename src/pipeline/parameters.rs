@@ -141,7 +141,7 @@ pub struct DeformableCounters {
     pub contact_error: f64,
     /// Dense factorizations of the contact problems.
     pub contact_factorizations: usize,
-    /// Contact problems that Newton's method did not solve: projected gradients went on.
+    /// Contact problems that Newton's method did not solve.
     pub contact_failures: usize,
     /// Sparse factorizations.
     pub factorizations: usize,

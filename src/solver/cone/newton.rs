@@ -34,6 +34,8 @@ const STAGE_STEPS: usize = 40;
 const NEAR_STEPS: usize = 8;
 /// Secants of a line search.
 const SECANTS: usize = 30;
+/// Stages of the continuation.
+const STAGES: [f64; 3] = [3e-2, 1e-3, EPSILON];
 /// Stages tried when warm start and short continuation failed.
 const FINE_STAGES: [f64; 7] = [1.0, 0.1, 1e-2, 3e-3, 1e-3, 3e-4, EPSILON];
 
@@ -126,12 +128,10 @@ impl ConeSolver {
                 done
             })
         };
+        let steps = if effort == Effort::Near { NEAR_STEPS } else { STAGE_STEPS };
         let done = continuation(self, &[(EPSILON, WARM_STEPS)])
-            || effort == Effort::Near
-                && continuation(self, &[(3e-2, NEAR_STEPS), (1e-3, NEAR_STEPS), (EPSILON, NEAR_STEPS)])
-            || effort == Effort::Full
-                && (continuation(self, &[(3e-2, STAGE_STEPS), (1e-3, STAGE_STEPS), (EPSILON, STAGE_STEPS)])
-                    || continuation(self, &FINE_STAGES.map(|e| (e, STAGE_STEPS))));
+            || effort != Effort::Warm && continuation(self, &STAGES.map(|e| (e, steps)))
+            || effort == Effort::Full && continuation(self, &FINE_STAGES.map(|e| (e, steps)));
         if !done {
             work.failures += 1;
             if effort != Effort::Full || self.gamma.iter().any(|g| !g.is_finite()) {

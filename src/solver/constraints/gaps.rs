@@ -29,6 +29,15 @@ pub(super) fn target_gap(constraint: &Constraint, bodies: &[BodyProblem], contex
     constraint.gap.max(-limits.recovery_speed * h)
 }
 
+/// The shorter of the mean edges of the bodies that a constraint is between \[m\]; infinite between rigid ones.
+pub(super) fn shorter_edge(constraint: &Constraint, bodies: &[BodyProblem]) -> f64 {
+    let edges = constraint.endpoints.iter().map(|endpoint| match endpoint {
+        Endpoint::Soft { body, .. } => bodies[*body].model.surface.mean_edge,
+        Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => f64::INFINITY,
+    });
+    edges.fold(f64::INFINITY, f64::min)
+}
+
 /// What is left of the gap, above its target_gap, at the bodies' trial positions \[m\].
 pub(super) fn end(
     constraint: &Constraint,

@@ -2,7 +2,7 @@
 //! sweeps over the contacts; else by projected gradients that only multiply with W.
 
 use super::context::SolveContext;
-use super::gaps::relative_motion;
+use super::gaps::{relative_motion, shorter_edge};
 use super::system::ContactSystem;
 use super::without_matrix::PRODUCTS;
 use crate::contact::{Endpoint, Law};
@@ -14,8 +14,8 @@ use crate::solver::cone::{ConeTolerance, Effort};
 const CROWD: usize = 6;
 /// Operations of a small island's factorizations in a step, at the most, before sweeps take over: a millisecond or two.
 const LIGHT_WORK: usize = 20_000_000;
-/// The same of what is still, or has rigid loads. A landing takes 1e7; what a thousand times its mass crushes at 1e3 Pa and 1/10 s takes 1.6e9,
-/// and at half of that ends below the floor.
+/// The same of what is still, or has rigid loads. A landing takes 1e7; what a thousand times its mass crushes at 1e3 Pa
+/// and 1/10 s takes 1.6e9, and at half of that ends below the floor.
 const LOADED_WORK: usize = 20_000_000_000;
 /// The same of crowds that are still: some 100 ms.
 const STILL_WORK: usize = 2_000_000_000;
@@ -126,17 +126,10 @@ impl ContactSystem {
 
     /// Whether contacts still overlap by more than a share of their bodies' edges.
     fn overlaps(&self, bodies: &[BodyProblem]) -> bool {
-        let edge = |endpoint: &Endpoint| match endpoint {
-            Endpoint::Soft { body, .. } => bodies[*body].model.surface.mean_edge,
-            Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => f64::INFINITY,
-        };
         let contacts = self.constraints[..self.active()].iter().zip(&self.dense.problem.offsets);
-        contacts.filter(|(constraint, _)| matches!(constraint.law, Law::Contact { .. })).any(
-            |(constraint, &first)| {
-                let shortest = edge(&constraint.endpoints[0]).min(edge(&constraint.endpoints[1]));
-                self.gaps[first] < -OVERLAP_LEFT * shortest
-            },
-        )
+        let mut contacts = contacts.filter(|(constraint, _)| matches!(constraint.law, Law::Contact { .. }));
+        contacts
+            .any(|(constraint, &first)| self.gaps[first] < -OVERLAP_LEFT * shorter_edge(constraint, bodies))
     }
 
     /// Takes the motions along the contacts' directions to the bodies' trial positions.
@@ -155,8 +148,8 @@ impl ContactSystem {
 
     /// Takes the gaps above their targets, and the slips, from the motions.
     pub(super) fn set_gaps(&mut self) {
-        self.gaps.clone_from(&self.motions);
         let mut gaps = std::mem::take(&mut self.gaps);
+        gaps.clone_from(&self.motions);
         self.add_targets(&mut gaps);
         self.gaps = gaps;
     }

@@ -7,7 +7,7 @@
 use super::coarse_space::CoarseSpace;
 use super::context::SolveContext;
 use super::delassus::{Delassus, steady_geometry};
-use super::gaps::{end, relative_motion, target_gap};
+use super::gaps::{end, relative_motion, shorter_edge, target_gap};
 use super::groups::ContactGroups;
 use super::matrix_free::Response;
 use super::rigid_proxy::{Reaction, RigidProxies};
@@ -183,13 +183,7 @@ impl ContactSystem {
             self.open.push(end(constraint, bodies, context, &reactions));
         }
         self.reactions = reactions;
-        let edge = |endpoint: &Endpoint| match endpoint {
-            Endpoint::Soft { body, .. } => bodies[*body].model.surface.mean_edge,
-            Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => f64::INFINITY,
-        };
-        let closes = |constraint: &Constraint, end: f64| {
-            end < slack * edge(&constraint.endpoints[0]).min(edge(&constraint.endpoints[1]))
-        };
+        let closes = |constraint: &Constraint, end: f64| end < slack * shorter_edge(constraint, bodies);
         let before = self.active;
         for i in before..self.constraints.len() {
             if closes(&self.constraints[i], self.open[i - before]) {
