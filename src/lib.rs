@@ -61,6 +61,7 @@
 
 mod math;
 mod profiler;
+mod threads;
 
 mod mesh;
 

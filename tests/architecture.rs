@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// From the ground up.
 const ROOMS: [&[&str]; 12] = [
-    &["math", "profiler"],
+    &["math", "profiler", "threads"],
     &["mesh"],
     &["energy"],
     &["material"],

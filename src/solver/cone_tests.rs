@@ -259,7 +259,7 @@ proptest! {
         let shift: Vec<f64> = (0..problem.contacts()).map(|_| numbers.between(0.0, 2.0)).collect();
         for start in [&case.solution, &projected] {
             let mut solver = ConeSolver::default();
-            solver.predict(problem, if right { &case.solution } else { &projected }, &shift, |_| -0.1);
+            solver.predict(problem, if right { &case.solution } else { &projected }, |i| shift[i], |_| -0.1);
             let (found, work) = solve(problem, &mut solver, start);
             prop_assert_eq!(work.failures, 0);
             prop_assert!(case.error(&found) <= case.allowed(), "{} of {}", case.error(&found), case.allowed());
@@ -280,7 +280,7 @@ proptest! {
         for start in [near, elsewhere] {
             let mut solver = ConeSolver::default();
             let shift = vec![0.0; problem.contacts()];
-            solver.predict(problem, &case.solution, &shift, |_| 0.1);
+            solver.predict(problem, &case.solution, |i| shift[i], |_| 0.1);
             let work = solve_once(problem, &mut solver, &start).1;
             // A second step with the same factor takes back rounding, 1e-16 of W/R by the condition.
             prop_assert!(work.factorizations <= 1 && work.newton_steps <= 2 && work.failures == 0, "{work:?}");
@@ -297,7 +297,7 @@ proptest! {
         let problem = &case.grouped;
         let start: Vec<f64> = case.solution.iter().map(|l| l * 0.999).collect();
         let mut solver = ConeSolver::default();
-        solver.predict(problem, &case.points(), &vec![0.0; problem.contacts()], |_| 0.1);
+        solver.predict(problem, &case.points(), |_| 0.0, |_| 0.1);
         let (_, work) = solve_once(problem, &mut solver, &start);
         prop_assert!(work.newton_steps <= 2 && work.failures == 0, "{work:?}");
     }
@@ -314,7 +314,7 @@ proptest! {
         problem.multiply(&lambda, &mut product);
         let (R, by_row) = regularised(problem, &case.W);
         let mut solver = ConeSolver::default();
-        solver.predict(problem, &case.points(), &vec![0.0; problem.contacts()], |_| 0.1);
+        solver.predict(problem, &case.points(), |_| 0.0, |_| 0.1);
         let work = solver.solve(problem, &mut lambda, &mut product, TOLERANCE, Effort::Full);
         // The warm start has done it: with continuation it would be a predictor step, and at least one step for each of its ends.
         prop_assume!(work.newton_steps <= 2);

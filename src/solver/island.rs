@@ -12,7 +12,7 @@ use crate::profiler::timed;
 use crate::solver::acceleration::Accelerator;
 use crate::solver::body_step::{BodyProblem, Factors, NewtonFactors};
 use crate::solver::cone::ConeTolerance;
-use crate::solver::constraints::{Change, ContactSystem, ContactWork, SolveContext};
+use crate::solver::constraints::{Change, ContactSystem, ContactWork, Slack, SolveContext};
 
 /// Bodies whose steps depend on one another.
 #[derive(Default)]
@@ -44,10 +44,10 @@ enum Outcome {
 
 /// Contact problems in one iteration.
 const ROUNDS: usize = 4;
-/// Distance, in mean edges, within which a contact is taken into the problem before it is solved.
-const NEARLY_CLOSED: f64 = 0.01;
+/// How near to touching a contact is taken into the problem before it is solved: of what moves, others will move it too.
+const NEARLY_CLOSED: Slack = Slack { edges: 0.01, motions: 0.1 };
 /// As [`NEARLY_CLOSED`], once it has been solved.
-const OVERLAPPING: f64 = -1.0e-5;
+const OVERLAPPING: Slack = Slack { edges: -1.0e-5, motions: 0.0 };
 /// Residual over forces beyond which a step is looked at again.
 const FAR_FROM_SOLVED: f64 = 0.1;
 /// Largest factor on A that the guard tries.
@@ -161,7 +161,7 @@ impl Island {
 
     /// One iteration.
     fn iterate(&mut self, context: &SolveContext<'_>) -> Outcome {
-        if self.newton_factors.refresh(&mut self.bodies, context.factors, &self.contacts.constraints) {
+        if self.newton_factors.refresh(&mut self.bodies, context.factors, self.contacts.constraints()) {
             self.contacts.outdate(Change::Factors);
         }
         let mut outcome;

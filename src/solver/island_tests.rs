@@ -35,7 +35,7 @@ pub(super) fn touching() -> (FactorCache, Island) {
         let mut constraint =
             Constraint::new([soft, Endpoint::Rigid { proxy: ProxyId(0), point: x }], Vec3::y(), 0.0, key);
         constraint.law = Law::Contact { friction: 0.4 };
-        island.contacts.constraints.push(constraint);
+        island.contacts.push(constraint);
     }
     island.bodies.push(problem);
     (cache, island)
@@ -80,9 +80,8 @@ fn solved_contacts_obey_signorini_and_coulomb() {
     island.solve(&SolveContext { factors: &cache, proxies: &proxy, h: H, limits: &LIMITS });
     let contacts: &ContactSystem = &island.contacts;
     let mut carrying = 0;
-    for i in 0..contacts.active() {
-        let l = &contacts.lambda[3 * i..3 * i + 3];
-        let gap = contacts.final_gap(i);
+    for (contact, result) in contacts.active.iter().zip(contacts.results()) {
+        let (l, gap) = (&contacts.lambda[contact.rows()], result.gap);
         // Lengths are of 1e-3 m over a step; the regularisation (ε = 1e-4) and the lagging shift of
         // slipping contacts leave less than 1e-4 of that.
         assert!(
@@ -91,7 +90,7 @@ fn solved_contacts_obey_signorini_and_coulomb() {
             island.report.iterations
         );
         // What carries is closed, but for the part of its slip by which the shift lags.
-        let slack = 1e-7 + 0.05 * contacts.shift[i];
+        let slack = 1e-7 + 0.05 * contact.shift;
         assert!(l[0] == 0.0 || gap < slack, "carries {} N at {gap:e} m, slack {slack:e}", l[0]);
         carrying += usize::from(l[0] > 0.0);
     }

@@ -30,7 +30,7 @@ mod tests;
 
 pub(crate) use body_step::{BodyProblem, SECOND_ORDER};
 pub(crate) use constraints::{
-    Articulation, ContactLimits, Reaction, RigidProxies, RigidProxy, SolveContext, Twist,
+    Articulation, ContactLimits, ContactResult, Reaction, RigidProxies, RigidProxy, SolveContext, Twist,
 };
 pub(crate) use island::{Island, IslandReport, ROUNDING};
 pub(crate) use linear::{FactorCache, FactorId, FactorKey, STEPS_KEPT};

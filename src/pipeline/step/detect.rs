@@ -2,13 +2,13 @@
 
 use super::quarantine::quarantine;
 use super::scratch::StepScratch;
-use super::threads::for_each;
 use super::work::BodyWork;
 use crate::body::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet};
 use crate::contact::Endpoint;
 use crate::coupling::{
     StepContext, SteppedBodies, WalkContext, attached_nodes, attachment_constraints, prescribed_nodes,
 };
+use crate::threads::for_each;
 
 impl StepScratch {
     pub(super) fn read_obstacles(&mut self, context: &StepContext<'_>) {

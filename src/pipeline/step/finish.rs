@@ -87,7 +87,7 @@ pub(super) fn store(
         history.v.clone_from(v);
     }
     body.state.factor_base.note(h, &problem.key.base);
-    let in_flight = work.island.contacts.active() == 0;
+    let in_flight = work.island.contacts.active.is_empty();
     problem.final_velocities(in_flight, &mut body.state.v);
     body.state.x.clone_from(&problem.current.x);
     let share = problem.pin_share();

@@ -29,7 +29,7 @@ impl Grouping {
         for island in islands.iter_mut() {
             island.members.clear();
             island.handles.clear();
-            island.island.contacts.constraints.clear();
+            island.island.contacts.clear();
         }
         self.island_of_root.clear();
         self.island_of_root.resize(works.len(), None);

@@ -6,8 +6,6 @@
 //! hand over reactions → (rapier steps) → after_step
 //! ```
 
-mod threads;
-
 mod quarantine;
 mod tunnelling;
 

@@ -8,15 +8,15 @@ use crate::contact::Endpoint;
 use crate::coupling::{body_handle, collider_handle, impulse_joint_handle};
 use crate::math::{Vec3, to_real};
 use crate::pipeline::{DeformableContact, DeformablePairContact, JointForce, RigidContact, SolvedJoint};
+use crate::solver::ContactResult;
 
 /// Gives attachments the forces of their constraints.
 pub(super) fn add_attachment_forces(work: &IslandWork, deformables: &mut DeformableBodySet) {
-    let system = &work.island.contacts;
-    for (i, constraint) in system.constraints.iter().enumerate() {
+    for ContactResult { constraint, force, .. } in work.island.contacts.results() {
         let ConstraintKey::Attachment(axis) = constraint.key else { continue };
         let handle = DeformableAttachmentHandle(axis.attachment);
         if let Some(attachment) = deformables.attachment_mut(handle) {
-            attachment.force += system.force(i);
+            attachment.force += force;
         }
     }
 }
@@ -27,9 +27,7 @@ pub(super) fn list_rigid_forces(
     contacts: &mut Vec<RigidContact>,
     joints: &mut Vec<JointForce>,
 ) {
-    let system = &work.island.contacts;
-    for (i, constraint) in system.constraints.iter().enumerate() {
-        let force = system.force(i);
+    for ContactResult { constraint, force, .. } in work.island.contacts.results() {
         let (joint, axis) = match constraint.key {
             ConstraintKey::Joint(axis) => (SolvedJoint::Impulse(impulse_joint_handle(axis.joint)), axis),
             ConstraintKey::MultibodyJoint(axis) => (SolvedJoint::Multibody(body_handle(axis.joint)), axis),
@@ -57,8 +55,7 @@ pub(super) fn list_contacts(
     handle_of: impl Fn(usize) -> DeformableBodyHandle,
     contacts: &mut Vec<DeformableContact>,
 ) {
-    let system = &work.island.contacts;
-    for (i, constraint) in system.constraints.iter().enumerate() {
+    for ContactResult { constraint, force, gap } in work.island.contacts.results() {
         let [Endpoint::Soft { body, .. }, Endpoint::Rigid { point, .. }] = &constraint.endpoints else {
             continue;
         };
@@ -69,8 +66,8 @@ pub(super) fn list_contacts(
             collider: collider_handle(key.collider),
             point: to_real(point),
             normal: to_real(normal),
-            force: to_real(&system.force(i)),
-            gap: system.final_gap(i),
+            force: to_real(&force),
+            gap,
         });
     }
 }
@@ -81,10 +78,8 @@ pub(super) fn list_pair_contacts(
     handle_of: impl Fn(usize) -> DeformableBodyHandle,
     contacts: &mut Vec<DeformablePairContact>,
 ) {
-    let system = &work.island.contacts;
-    for (i, constraint) in
-        system.constraints.iter().enumerate().filter(|(_, constraint)| constraint.key.is_soft_pair())
-    {
+    let is_pair = |contact: &ContactResult<'_>| contact.constraint.key.is_soft_pair();
+    for ContactResult { constraint, force, gap } in work.island.contacts.results().filter(is_pair) {
         let [Endpoint::Soft { body: first, .. }, Endpoint::Soft { body: second, .. }] = constraint.endpoints
         else {
             continue;
@@ -95,8 +90,8 @@ pub(super) fn list_pair_contacts(
             body2: handle_of(second),
             point: to_real(&point),
             normal: to_real(&constraint.frame[0]),
-            force: to_real(&system.force(i)),
-            gap: system.final_gap(i),
+            force: to_real(&force),
+            gap,
         });
     }
 }

@@ -5,6 +5,7 @@ use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Surro
 use crate::contact::{Candidates, Law};
 use crate::coupling::{RapierScene, RapierSets, StepContext};
 use crate::math::{Pose64, Vec3};
+use crate::solver::ContactResult;
 use rapier3d::dynamics::{RigidBody, RigidBodyHandle};
 
 /// Where a body looks around.
@@ -129,15 +130,14 @@ impl Sleeping {
             return;
         }
         let first = self.rigid.len();
-        let contacts = &island.island.contacts;
         // What is only about to meet another rigid body stays awake.
-        let touching = |i: &usize| {
-            let constraint = &contacts.constraints[*i];
+        let touching = |contact: &ContactResult<'_>| {
+            let constraint = contact.constraint;
             let between_rigid = constraint.key.is_shared() && matches!(constraint.law, Law::Contact { .. });
-            !between_rigid || contacts.force(*i) != Vec3::zeros()
+            !between_rigid || contact.force != Vec3::zeros()
         };
-        let constraints = (0..contacts.constraints.len()).filter(touching).map(|i| &contacts.constraints[i]);
-        for endpoint in constraints.flat_map(|constraint| &constraint.endpoints) {
+        let touching = island.island.contacts.results().filter(touching);
+        for endpoint in touching.flat_map(|contact| &contact.constraint.endpoints) {
             let Some(proxy) = endpoint.proxy().filter(|p| scene.proxies.yields(*p)) else { continue };
             let Some(handle) = scene.handles[proxy.0 as usize] else { continue };
             if !scene.is_still(context.sets, handle) {

@@ -1,10 +1,10 @@
 //! Deformable bodies that come near one another, and the contacts between them.
 
-use super::threads::for_each;
 use super::work::BodyWork;
 use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet};
 use crate::contact::{Constraint, Endpoint, SoftDetector, SoftPair};
 use crate::coupling::combined_between;
+use crate::threads::for_each;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use std::collections::HashMap;
 

@@ -1,8 +1,8 @@
 //! The solve of every island, and what has come into obstacles without a contact.
 
 use super::scratch::StepScratch;
-use super::threads::for_each;
 use crate::solver::{ContactLimits, SolveContext};
+use crate::threads::for_each;
 
 impl StepScratch {
     pub(super) fn solve(&mut self, limits: &ContactLimits, h: f64) {

@@ -279,7 +279,7 @@ impl IslandWork {
                     *body = local;
                 }
             }
-            self.island.contacts.constraints.push(constraint);
+            self.island.contacts.push(constraint);
         }
     }
 
@@ -293,7 +293,7 @@ impl IslandWork {
                 *body = local;
             }
         }
-        self.island.contacts.constraints.push(constraint);
+        self.island.contacts.push(constraint);
     }
 
     /// Whether every number that leaves the island is finite.
@@ -304,25 +304,21 @@ impl IslandWork {
 
     /// Gives neighbourhood and attachments the forces that a member remembers.
     pub fn warm_start_links(&mut self, state: &DeformableState) {
-        for constraint in
-            self.island.contacts.constraints.iter_mut().filter(|constraint| constraint.key.is_shared())
-        {
+        let constraints =
+            self.island.contacts.candidates.iter_mut().map(|candidate| &mut candidate.constraint);
+        for constraint in constraints.filter(|constraint| constraint.key.is_shared()) {
             if let Some(memory) = state.shared_memory(&constraint.key) {
                 constraint.warm_start(memory);
             }
         }
     }
 
-    fn active_constraints(&self) -> impl Iterator<Item = (usize, &Constraint)> {
-        let contacts = &self.island.contacts;
-        contacts.constraints[..contacts.active()].iter().enumerate()
-    }
-
     /// What neighbourhood and attachments leave to the next step, ascending by key.
     pub fn memory_of_links(&self, h: f64, memory: &mut Vec<ConstraintMemory>) {
         memory.clear();
-        let links = self.active_constraints().filter(|(_, constraint)| constraint.key.is_shared());
-        memory.extend(links.map(|(i, _)| self.island.contacts.memory(i, h)));
+        let contacts = &self.island.contacts;
+        let links = contacts.active.iter().filter(|contact| contact.constraint.key.is_shared());
+        memory.extend(links.map(|contact| contacts.memory(contact, h)));
         memory.sort_unstable_by_key(|m| m.key);
     }
 
@@ -333,11 +329,11 @@ impl IslandWork {
         if self.island.bodies[member].is_rejected {
             return;
         }
-        let own = |constraint: &Constraint| matches!(constraint.endpoints[0], Endpoint::Soft { body, .. } if body == member);
-        let own = self
-            .active_constraints()
-            .filter(|(_, constraint)| own(constraint) && !constraint.key.is_shared());
-        memory.extend(own.map(|(i, _)| self.island.contacts.memory(i, h)));
+        let contacts = &self.island.contacts;
+        let own = contacts.active.iter().filter(|contact| {
+            contact.constraint.endpoints[0].is_of(member) && !contact.constraint.key.is_shared()
+        });
+        memory.extend(own.map(|contact| contacts.memory(contact, h)));
         memory.sort_unstable_by_key(|m| m.key);
     }
 }

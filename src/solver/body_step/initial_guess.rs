@@ -1,6 +1,6 @@
 //! Where the iteration of a body starts, and in which frames.
 
-use super::problem::{BodyProblem, FRAME_ERROR};
+use super::problem::BodyProblem;
 use crate::body::{Frames, Solver};
 use crate::fem::{SystemMatrix, floating_frame};
 use crate::math::{Mat3, Vec3};
@@ -8,6 +8,8 @@ use crate::solver::linear::SystemFactor;
 
 /// Largest rotation of an element against the body's frame for which one frame serves.
 const FLOATING_LIMIT: f64 = 20.0 * std::f64::consts::PI / 180.0;
+/// Rotation of the body against its frame \[rad\] beyond which the frame is turned after it within a step, and W made anew.
+const FRAME_DRIFT: f64 = 1.0e-2;
 
 impl BodyProblem {
     /// Chooses where the iteration starts, and the frames of the preconditioner: the rigidly extrapolated
@@ -95,6 +97,6 @@ impl BodyProblem {
             return false;
         }
         let (turned, _, _) = floating_frame(&self.model, &self.current.x);
-        self.preconditioner.turn_floating(&turned, FRAME_ERROR)
+        self.preconditioner.turn_floating(&turned, FRAME_DRIFT)
     }
 }

@@ -45,11 +45,11 @@ impl NewtonFactors {
     }
 
     /// Makes the factors at the bodies' current states; true if there are bodies that want them.
-    pub fn refresh(
+    pub fn refresh<'a>(
         &mut self,
         bodies: &mut [BodyProblem],
         cache: &FactorCache,
-        constraints: &[Constraint],
+        constraints: impl Iterator<Item = &'a Constraint> + Clone,
     ) -> bool {
         let mut some = false;
         for (index, body) in bodies.iter_mut().enumerate() {
@@ -59,19 +59,19 @@ impl NewtonFactors {
             some = true;
             body.step_damping = 1.0;
             let symbolic = &cache.get(body.factor).symbolic;
-            self.made[index] = self.tangent(index, body, symbolic, constraints);
+            self.made[index] = self.tangent(index, body, symbolic, constraints.clone());
         }
         some
     }
 
     /// The Hessian itself if it is positive definite, else without its negative part. `None` where even
     /// that cannot be factored: the body then makes do with the cache's.
-    fn tangent(
+    fn tangent<'a>(
         &mut self,
         index: usize,
         body: &BodyProblem,
         symbolic: &std::sync::Arc<Symbolic>,
-        constraints: &[Constraint],
+        constraints: impl Iterator<Item = &'a Constraint>,
     ) -> Option<SystemFactor> {
         let (factor, coarse) = [false, true].into_iter().find_map(|projected| {
             let (x, pins) = (&body.current.x, &body.key.pins);
@@ -82,7 +82,6 @@ impl NewtonFactors {
         let surface = &body.model.surface;
         let mut columns = ComplianceColumns::new(surface, SystemMatrix::RestStiffness);
         let nodes = constraints
-            .iter()
             .flat_map(|constraint| &constraint.endpoints)
             .filter(|endpoint| endpoint.is_of(index))
             .flat_map(Endpoint::soft_nodes);

@@ -15,8 +15,8 @@ use crate::profiler::timed;
 use crate::solver::linear::{FactorId, FactorKey, Preconditioner, SystemFactor};
 use std::sync::Arc;
 
-/// Error of the body's frame \[rad\] beyond which it is refreshed within a step.
-pub(super) const FRAME_ERROR: f64 = 1.0e-4;
+/// Rotation of an iteration \[rad\] beyond which it is bent to a true one: below, the stretch is 5e-9.
+const BENT: f64 = 1.0e-4;
 
 /// Step of the matrix over that of time, of the second order.
 pub(crate) const SECOND_ORDER: f64 = 2.0 / 3.0;
@@ -177,8 +177,7 @@ impl BodyProblem {
         }
         let inertia = inertia_about(&centre, &self.current.x, &self.masses);
         let omega = solve_semidefinite(&inertia, &moment);
-        // Below this the stretch is 5e-9.
-        if !(omega.norm() > FRAME_ERROR) {
+        if !(omega.norm() > BENT) {
             return false;
         }
         let bend = rotation_from_vector(&omega) - Mat3::identity() - skew(&omega);

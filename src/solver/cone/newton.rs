@@ -74,7 +74,7 @@ impl ConeSolver {
         &mut self,
         problem: &ConeProblem,
         lambda: &[f64],
-        shift: &[f64],
+        shift: impl Fn(usize) -> f64,
         end: impl Fn(usize) -> f64,
     ) {
         self.set_regularisation(problem, EPSILON);
@@ -87,8 +87,8 @@ impl ConeSolver {
             }
             let (Law::Contact { friction: mu }, [normal, a, b]) = (law, force) else { continue };
             let friction = a.hypot(*b);
-            if *normal > 0.0 && shift[i] > 0.0 && friction > 0.0 {
-                let beyond = 1.0 + shift[i] / (mu * self.R[i] * friction);
+            if *normal > 0.0 && shift(i) > 0.0 && friction > 0.0 {
+                let beyond = 1.0 + shift(i) / (mu * self.R[i] * friction);
                 (*a, *b) = (*a * beyond, *b * beyond);
             }
         }

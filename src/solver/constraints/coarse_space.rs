@@ -1,6 +1,7 @@
 //! The metric of the first-order contact solve for an island: modes of its bodies and proxies at their contacts.
 
 use super::elimination::Elimination;
+use super::lists::ActiveContact;
 use super::rigid_proxy::{RigidProxies, RigidProxy};
 use crate::contact::{Constraint, Endpoint, ProxyId};
 use crate::math::lanes::Lane;
@@ -41,8 +42,8 @@ pub(super) struct CoarseParts<'a> {
 const RIGID_SHARE: f64 = 1.0e-3;
 
 impl CoarseSpace {
-    /// Makes the metric of these constraints.
-    pub fn update(&mut self, metric: &mut ConeMetric, constraints: &[Constraint], parts: CoarseParts<'_>) {
+    /// Makes the metric of these contacts.
+    pub fn update(&mut self, metric: &mut ConeMetric, contacts: &[ActiveContact], parts: CoarseParts<'_>) {
         self.rigid.clear();
         self.of_body.clear();
         self.of_proxy.clear();
@@ -53,10 +54,8 @@ impl CoarseSpace {
             self.rigid.extend(modes);
         }
         metric.contacts.clear();
-        let mut first = 0;
-        for constraint in constraints {
-            let contact = self.contact(constraint, first, parts);
-            first += contact.dimension;
+        for contact in contacts {
+            let contact = self.contact(&contact.constraint, contact.first, parts);
             metric.contacts.push(contact);
         }
         metric.bodies = self.rigid.len();

@@ -2,13 +2,14 @@
 //! of has changed.
 
 use super::groups::ContactGroups;
-use super::rigid_proxy::{Articulation, RigidProxies, RigidProxy, stacked};
+use super::jacobian::{Between, JacobianColumn};
+use super::lists::{ActiveContact, MatrixPlace};
+use super::rigid_proxy::{RigidProxies, RigidProxy};
 use crate::body::ConstraintGeometry;
-use crate::contact::{Constraint, Endpoint, ProxyId};
-use crate::math::{Mat3, Vec3};
+use crate::contact::{Constraint, Endpoint};
+use crate::math::Mat3;
 use crate::solver::body_step::{BodyProblem, Factors};
 use crate::solver::linear::BlockMatrix;
-use nalgebra::Vector6;
 
 /// What the last W was made of, and memory for making the next.
 #[derive(Default)]
@@ -16,14 +17,16 @@ pub(crate) struct Delassus {
     made_from: Ingredients,
     fresh: Ingredients,
     jacobian: Vec<[JacobianColumn; 2]>,
-    /// First constraint of each group, and the number of constraints last.
+    /// First row of each group, and the number of rows last.
     starts: Vec<usize>,
+    before: BlockMatrix,
+    stamps: Vec<BodyStamp>,
+    changed: Vec<bool>,
 }
 
-/// The constraints of an island in their order.
+/// The contacts of an island in their order.
 pub(crate) struct ContactRows<'a> {
-    pub constraints: &'a [Constraint],
-    pub geometry: &'a [ConstraintGeometry],
+    pub contacts: &'a mut [ActiveContact],
     /// First row of each contact in W, and the number of rows last.
     pub offsets: &'a [usize],
     pub groups: &'a ContactGroups,
@@ -52,217 +55,151 @@ pub(crate) fn steady_geometry(constraint: &Constraint, proxies: &RigidProxies) -
 }
 
 impl Delassus {
-    /// Brings W up to date; false if it was.
+    /// Brings W up to date; false if it was. What has not changed since it was made last is taken from there: the same
+    /// bits as if it were made anew.
     pub fn update(
         &mut self,
         W: &mut BlockMatrix,
-        contacts: &ContactRows<'_>,
+        rows: ContactRows<'_>,
         bodies: &[BodyProblem],
         factors: Factors<'_>,
         proxies: &RigidProxies,
         h: f64,
     ) -> bool {
+        let ContactRows { contacts, offsets, groups } = rows;
         self.fresh.describe(contacts, bodies, factors, proxies, h);
-        if self.fresh.comparable && self.fresh == self.made_from {
-            return false;
+        let is_known = self.fresh.comparable && self.fresh == self.made_from;
+        if !is_known {
+            std::mem::swap(&mut self.fresh, &mut self.made_from);
+            self.mark_changed(bodies, factors);
+            self.jacobian.clear();
+            for contact in &*contacts {
+                let jacobian_column = |k: usize| JacobianColumn::new(contact, k, bodies, proxies, h);
+                self.jacobian.push([jacobian_column(0), jacobian_column(1)]);
+            }
+            std::mem::swap(W, &mut self.before);
+            self.starts.clear();
+            self.starts.extend(groups.starts.iter().map(|&contact| offsets[contact]));
+            W.reset(&self.starts, &groups.coupled);
+            let making = Making { of: self, contacts, groups, between: Between { bodies, factors, proxies } };
+            W.for_each_block(|k, values| making.fill(groups.coupled[k], values));
         }
-        std::mem::swap(&mut self.fresh, &mut self.made_from);
-        self.jacobian.clear();
-        for (constraint, geometry) in contacts.constraints.iter().zip(contacts.geometry) {
-            let jacobian_column = |k: usize| JacobianColumn::new(constraint, k, geometry, bodies, proxies, h);
-            self.jacobian.push([jacobian_column(0), jacobian_column(1)]);
+        for group in 0..groups.starts.len() - 1 {
+            let members = groups.starts[group]..groups.starts[group + 1];
+            let first = offsets[members.start];
+            for contact in &mut contacts[members] {
+                contact.in_matrix = Some(MatrixPlace { group, row: contact.first - first });
+            }
         }
-        let ContactRows { constraints, offsets, groups, .. } = contacts;
-        self.starts.clear();
-        self.starts.extend(groups.starts.iter().map(|&contact| offsets[contact]));
-        W.reset(&self.starts, &groups.coupled);
-        let between = Between { bodies, factors, proxies };
-        for (k, &(gi, gj)) in groups.coupled.iter().enumerate() {
-            let (first_row, first_column) = (self.starts[gi], self.starts[gj]);
-            let m = self.starts[gi + 1] - first_row;
-            let values = W.block_mut(k);
-            for j in groups.starts[gj]..groups.starts[gj + 1] {
-                // The diagonal's blocks are symmetric.
-                let from = if gi == gj { j } else { groups.starts[gi] };
-                for i in from..groups.starts[gi + 1] {
-                    let block = between.contacts(&self.jacobian[i], &self.jacobian[j]);
-                    let (row, column) = (offsets[i] - first_row, offsets[j] - first_column);
-                    for c in 0..constraints[j].dimension() {
-                        for r in 0..constraints[i].dimension() {
-                            values[(column + c) * m + row + r] = block[(r, c)];
-                            if gi == gj {
-                                values[(row + r) * m + column + c] = block[(r, c)];
-                            }
+        !is_known
+    }
+
+    /// Takes note of the bodies that yield otherwise than when W was made last.
+    fn mark_changed(&mut self, bodies: &[BodyProblem], factors: Factors<'_>) {
+        let stamps = bodies.iter().enumerate().map(|(i, body)| BodyStamp {
+            preconditioner: body.preconditioner.version,
+            damping: body.step_damping,
+            factor: factors.of(i, body).serial,
+        });
+        self.stamps.resize(bodies.len(), BodyStamp::default());
+        self.changed.clear();
+        let differs = stamps.zip(&mut self.stamps).map(|(now, then)| std::mem::replace(then, now) != now);
+        self.changed.extend(differs);
+    }
+}
+
+/// What W is being made of.
+struct Making<'a> {
+    of: &'a Delassus,
+    contacts: &'a [ActiveContact],
+    groups: &'a ContactGroups,
+    between: Between<'a>,
+}
+
+impl Making<'_> {
+    /// Fills the block of two groups.
+    fn fill(&self, (gi, gj): (usize, usize), values: &mut [f64]) {
+        let starts = &self.groups.starts;
+        let (rows, columns) =
+            (&self.contacts[starts[gi]..starts[gi + 1]], &self.contacts[starts[gj]..starts[gj + 1]]);
+        let m = self.of.starts[gi + 1] - self.of.starts[gi];
+        let before = self.block_before(rows, columns);
+        for (j, at) in columns.iter().enumerate() {
+            // The diagonal's blocks are symmetric.
+            let from = if gi == gj { j } else { 0 };
+            let column = at.first - self.of.starts[gj];
+            for (i, on) in rows.iter().enumerate().skip(from) {
+                let row = on.first - self.of.starts[gi];
+                let block =
+                    before.as_ref().and_then(|before| before.take(on, at, gi == gj)).unwrap_or_else(|| {
+                        let jacobian = &self.of.jacobian;
+                        self.between.contacts(&jacobian[starts[gi] + i], &jacobian[starts[gj] + j])
+                    });
+                for c in 0..at.constraint.dimension() {
+                    for r in 0..on.constraint.dimension() {
+                        values[(column + c) * m + row + r] = block[(r, c)];
+                        if gi == gj {
+                            values[(row + r) * m + column + c] = block[(r, c)];
                         }
                     }
                 }
-                if gi == gj {
-                    let own = offsets[j] - first_row;
-                    values[own * m + own] += constraints[j].compliance;
-                }
+            }
+            if gi == gj {
+                values[column * m + column] += at.constraint.compliance;
             }
         }
-        true
     }
-}
 
-/// What one endpoint of a contact moves, along the contact's directions, with its sign.
-enum JacobianColumn {
-    /// Fixed or kinematic.
-    Idle,
-    Soft {
-        body: usize,
-        count: usize,
-        nodes: [usize; 3],
-        /// Their places on the surface.
-        places: [usize; 3],
-        weights: [f64; 3],
-        /// Directions; in the frame of a body that has one frame.
-        directions: Mat3,
-    },
-    Rigid {
-        proxy: ProxyId,
-        /// Force and moment per unit along each direction.
-        wrenches: [[Vec3; 2]; 3],
-        /// What those move in a step.
-        motions: [[Vec3; 2]; 3],
-    },
-    Link {
-        articulation: usize,
-        slot: usize,
-        wrenches: [Vector6<f64>; 3],
-    },
-}
-
-impl JacobianColumn {
-    fn new(
-        constraint: &Constraint,
-        k: usize,
-        geometry: &ConstraintGeometry,
-        bodies: &[BodyProblem],
-        proxies: &RigidProxies,
-        h: f64,
-    ) -> Self {
-        let sign = [1.0, -1.0][k];
-        let endpoint = match constraint.endpoints[k] {
+    /// The block of two groups in the W before, if nothing between them has changed since.
+    fn block_before(&self, rows: &[ActiveContact], columns: &[ActiveContact]) -> Option<BlockBefore<'_>> {
+        let group =
+            |contacts: &[ActiveContact]| contacts.iter().find_map(|c| c.in_matrix).map(|place| place.group);
+        let (gi, gj) = (group(rows)?, group(columns)?);
+        let shares_changed = rows[0].constraint.endpoints.iter().any(|endpoint| match endpoint {
             Endpoint::Soft { body, .. } => {
-                return Self::soft(body, geometry, k, sign, &bodies[body]);
+                self.of.changed[*body]
+                    && columns[0].constraint.endpoints.iter().any(|other| other.is_of(*body))
             }
-            Endpoint::Rigid { proxy, .. } => {
-                Endpoint::Rigid { proxy, point: proxies.get(proxy).com() + geometry.arms[k] }
-            }
-            turn @ Endpoint::Rotation { .. } => turn,
-        };
-        let Some(id) = endpoint.proxy() else { return Self::Idle };
-        let proxy = proxies.get(id);
-        let wrenches = geometry.frame.map(|d| proxy.wrench(&endpoint, &(d * sign)));
-        match proxy {
-            RigidProxy::Rigid { inv_mass, steady_inv_inertia, .. } if proxies.yields(id) => {
-                let motion = |[f, m]: [Vec3; 2]| {
-                    [inv_mass.component_mul(&f) * (h * h), steady_inv_inertia * m * (h * h)]
-                };
-                Self::Rigid { proxy: id, wrenches, motions: wrenches.map(motion) }
-            }
-            RigidProxy::Link { articulation, slot, .. } => Self::Link {
-                articulation: *articulation,
-                slot: *slot,
-                wrenches: wrenches.map(|w| stacked(&w) * h),
-            },
-            _ => Self::Idle,
+            Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => false,
+        });
+        if shares_changed {
+            return None;
         }
-    }
-
-    fn soft(body: usize, geometry: &ConstraintGeometry, k: usize, sign: f64, problem: &BodyProblem) -> Self {
-        let frame = problem.preconditioner.one_frame().unwrap_or_else(Mat3::identity);
-        let directions =
-            frame.tr_mul(&Mat3::from_columns(&geometry.frame)) * (sign / problem.step_damping.sqrt());
-        let (mut count, mut nodes, mut places, mut weights) = (0, [0; 3], [0; 3], [0.0; 3]);
-        for (&node, &weight) in geometry.nodes[k].iter().zip(&geometry.weights[k]) {
-            if weight != 0.0 {
-                nodes[count] = node as usize;
-                places[count] = problem.model.surface.index_of_node[node as usize] as usize;
-                weights[count] = weight;
-                count += 1;
-            }
-        }
-        Self::Soft { body, count, nodes, places, weights, directions }
+        let values = self.of.before.block(self.of.before.find(gi, gj)?);
+        Some(BlockBefore { values, rows: self.of.before.pattern().range(gi).len() })
     }
 }
 
-/// What the Jacobian columns act on.
-struct Between<'a> {
-    bodies: &'a [BodyProblem],
-    factors: Factors<'a>,
-    proxies: &'a RigidProxies,
+/// A block of the W before.
+struct BlockBefore<'a> {
+    values: &'a [f64],
+    rows: usize,
 }
 
-impl Between<'_> {
-    /// The block of W between two contacts.
-    fn contacts(&self, a: &[JacobianColumn; 2], b: &[JacobianColumn; 2]) -> Mat3 {
-        let mut sum = Mat3::zeros();
-        for a in a {
-            for b in b {
-                self.add(a, b, &mut sum);
+impl BlockBefore<'_> {
+    /// What it has for two contacts, if it was made the same way round.
+    fn take(&self, on: &ActiveContact, at: &ActiveContact, is_diagonal: bool) -> Option<Mat3> {
+        let (on, at, [m, n]) = (on.in_matrix?, at.in_matrix?, [on, at].map(|c| c.constraint.dimension()));
+        // The diagonal has the constraints' own compliance too.
+        if is_diagonal && on.row <= at.row {
+            return None;
+        }
+        let mut block = Mat3::zeros();
+        for c in 0..n {
+            for r in 0..m {
+                block[(r, c)] = self.values[(at.row + c) * self.rows + on.row + r];
             }
         }
-        sum
+        Some(block)
     }
+}
 
-    /// What two contacts have to do with one another through a soft body.
-    fn of_body(&self, index: usize, a: &JacobianColumn, b: &JacobianColumn) -> Mat3 {
-        let (
-            JacobianColumn::Soft { count: m, nodes, places, weights, directions, .. },
-            JacobianColumn::Soft {
-                count: n,
-                nodes: nodes_b,
-                places: places_b,
-                weights: weights_b,
-                directions: directions_b,
-                ..
-            },
-        ) = (a, b)
-        else {
-            return Mat3::zeros();
-        };
-        let body = &self.bodies[index];
-        let factor = self.factors.of(index, body);
-        let has_one_frame = body.preconditioner.one_frame().is_some();
-        let pairs = (0..*n).flat_map(|l| (0..*m).map(move |k| (k, l)));
-        let block = |(k, l): (usize, usize)| {
-            let (on, at) = ([places[k], places_b[l]], [nodes[k], nodes_b[l]]);
-            let mut block = body.preconditioner.inverse_block(factor, on, at);
-            if !has_one_frame {
-                block = body.preconditioner.compliance(factor, &block, nodes[k], nodes_b[l]);
-            }
-            block * (weights[k] * weights_b[l])
-        };
-        directions.tr_mul(&(pairs.map(block).sum::<Mat3>() * directions_b))
-    }
-
-    fn add(&self, a: &JacobianColumn, b: &JacobianColumn, sum: &mut Mat3) {
-        match (a, b) {
-            (JacobianColumn::Soft { body: i, .. }, JacobianColumn::Soft { body: j, .. }) if i == j => {
-                *sum += self.of_body(*i, a, b);
-            }
-            (
-                JacobianColumn::Rigid { proxy: i, wrenches, .. },
-                JacobianColumn::Rigid { proxy: j, motions, .. },
-            ) if i == j => {
-                *sum += Mat3::from_fn(|r, c| {
-                    wrenches[r][0].dot(&motions[c][0]) + wrenches[r][1].dot(&motions[c][1])
-                });
-            }
-            (
-                JacobianColumn::Link { articulation, slot, wrenches },
-                JacobianColumn::Link { articulation: other, slot: from, wrenches: acting },
-            ) if articulation == other => {
-                let Articulation { links, blocks } = &self.proxies.articulations[*articulation];
-                let moved = acting.map(|w| blocks[slot * links.len() + from] * w);
-                *sum += Mat3::from_fn(|r, c| wrenches[r].dot(&moved[c]));
-            }
-            _ => {}
-        }
-    }
+/// Changes whenever a body yields otherwise.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct BodyStamp {
+    preconditioner: u64,
+    damping: f64,
+    factor: u64,
 }
 
 /// Everything that W depends on.
@@ -279,7 +216,7 @@ struct Ingredients {
 impl Ingredients {
     fn describe(
         &mut self,
-        contacts: &ContactRows<'_>,
+        contacts: &[ActiveContact],
         bodies: &[BodyProblem],
         factors: Factors<'_>,
         proxies: &RigidProxies,
@@ -301,7 +238,7 @@ impl Ingredients {
             self.bits.push(body.step_damping);
             self.bits.extend(body.preconditioner.one_frame().iter().flat_map(|frame| frame.iter()));
         }
-        for (constraint, geometry) in contacts.constraints.iter().zip(contacts.geometry) {
+        for ActiveContact { constraint, geometry, .. } in contacts {
             self.bits.push(constraint.compliance);
             self.bits.extend(geometry.frame[..constraint.dimension()].iter().flat_map(|d| d.iter()));
             for (k, endpoint) in constraint.endpoints.iter().enumerate() {

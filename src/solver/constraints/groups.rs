@@ -2,6 +2,7 @@
 //! little.
 
 use super::elimination::Elimination;
+use super::lists::ActiveContact;
 use super::rigid_proxy::RigidProxies;
 use crate::contact::{Constraint, Endpoint};
 
@@ -23,9 +24,9 @@ pub(crate) struct ContactGroups {
 }
 
 impl ContactGroups {
-    /// Puts the constraints into groups, and the groups into an order of least degree.
-    pub fn arrange(&mut self, constraints: &mut [Constraint], proxies: &RigidProxies) {
-        self.find(constraints, proxies);
+    /// Puts the contacts into groups, and the groups into an order of least degree.
+    pub fn arrange(&mut self, contacts: &mut [ActiveContact], proxies: &RigidProxies) {
+        self.find(contacts, proxies);
         self.find_adjacent();
         self.elimination.arrange(&self.sizes);
         let (group_of_constraint, rank) = (&self.group_of_constraint, &self.elimination.rank);
@@ -36,7 +37,8 @@ impl ContactGroups {
                 let found = known.binary_search_by_key(&ends_of(constraint, proxies), |(ends, _)| *ends);
                 found.map_or(usize::MAX, |at| rank[known[at].1])
             };
-            constraints.sort_unstable_by(|a, b| rank_of(a).cmp(&rank_of(b)).then(a.key.cmp(&b.key)));
+            let order = |a: &Constraint, b: &Constraint| rank_of(a).cmp(&rank_of(b)).then(a.key.cmp(&b.key));
+            contacts.sort_unstable_by(|a, b| order(&a.constraint, &b.constraint));
         }
         let groups = self.sizes.len();
         self.starts.clear();
@@ -47,13 +49,13 @@ impl ContactGroups {
         self.fill();
     }
 
-    fn find(&mut self, constraints: &[Constraint], proxies: &RigidProxies) {
+    fn find(&mut self, contacts: &[ActiveContact], proxies: &RigidProxies) {
         self.ends.clear();
         self.known.clear();
         self.sizes.clear();
         self.group_of_constraint.clear();
-        for constraint in constraints {
-            let ends = ends_of(constraint, proxies);
+        for contact in contacts {
+            let ends = ends_of(&contact.constraint, proxies);
             let last = self.group_of_constraint.last().copied().filter(|&g: &usize| self.ends[g] == ends);
             let group = last.unwrap_or_else(|| match self.known.binary_search_by_key(&ends, |(e, _)| *e) {
                 Ok(at) => self.known[at].1,

@@ -3,6 +3,7 @@
 
 use super::context::SolveContext;
 use super::gaps::{relative_motion, shorter_edge};
+use super::lists::ActiveContact;
 use super::system::ContactSystem;
 use super::without_matrix::PRODUCTS;
 use crate::contact::{Endpoint, Law};
@@ -55,7 +56,7 @@ impl ContactSystem {
         context: &SolveContext<'_>,
         tolerance: ConeTolerance,
     ) -> bool {
-        if self.active() == 0 {
+        if self.active.is_empty() {
             return false;
         }
         let around = Around { factors, context, tolerance };
@@ -71,7 +72,10 @@ impl ContactSystem {
         if is_small && self.spent.operations + solve <= work {
             return self.solve_by_newton(bodies, around, Effort::Full).unwrap_or(false);
         }
-        if let Some(changed) = self.try_newton(bodies, around) {
+        // Crowds that move are too far from solved for it.
+        if (is_small || is_still)
+            && let Some(changed) = self.try_newton(bodies, around)
+        {
             return changed;
         }
         let changed = self.solve_by_sweeps(bodies, around);
@@ -90,7 +94,7 @@ impl ContactSystem {
     /// Whether something rigid that yields might take part: sweeps carry a load through light things slowly.
     fn has_loads(&self, context: &SolveContext<'_>) -> bool {
         let yields = |endpoint: &Endpoint| endpoint.proxy().is_some_and(|p| context.proxies.yields(p));
-        self.constraints.iter().any(|constraint| constraint.endpoints.iter().any(yields))
+        self.constraints().any(|constraint| constraint.endpoints.iter().any(yields))
     }
 
     /// Whether W would cost more than the products that go without it: where bodies are crushed into one another, each has
@@ -100,7 +104,7 @@ impl ContactSystem {
         let making = MAKING[usize::from(!has_one_frame)] * self.groups.product_work();
         let numbers: usize =
             bodies.iter().enumerate().map(|(i, b)| factors.of(i, b).symbolic.factor_len()).sum();
-        let product = 4 * numbers + PER_BODY * bodies.len() + PER_CONTACT * self.active();
+        let product = 4 * numbers + PER_BODY * bodies.len() + PER_CONTACT * self.active.len();
         making > PRODUCTS[1] * product
     }
 
@@ -121,15 +125,16 @@ impl ContactSystem {
         let shortest = bodies.iter().map(|b| b.model.surface.mean_edge).fold(f64::INFINITY, f64::min);
         let (far, fast) = (STILL * shortest, STILL * shortest / h);
         let is_slow = |body: &BodyProblem| body.v_start.iter().all(|v| v.norm_squared() <= fast * fast);
-        bodies.iter().all(is_slow) && self.constraints.iter().all(|c| c.target_gap >= -far)
+        bodies.iter().all(is_slow) && self.constraints().all(|c| c.target_gap >= -far)
     }
 
     /// Whether contacts still overlap by more than a share of their bodies' edges.
     fn overlaps(&self, bodies: &[BodyProblem]) -> bool {
-        let contacts = self.constraints[..self.active()].iter().zip(&self.dense.problem.offsets);
-        let mut contacts = contacts.filter(|(constraint, _)| matches!(constraint.law, Law::Contact { .. }));
-        contacts
-            .any(|(constraint, &first)| self.gaps[first] < -OVERLAP_LEFT * shorter_edge(constraint, bodies))
+        let is_deep = |ActiveContact { constraint, first, .. }: &ActiveContact| {
+            self.gaps[*first] < -OVERLAP_LEFT * shorter_edge(constraint, bodies)
+        };
+        let may_open = |contact: &&ActiveContact| matches!(contact.constraint.law, Law::Contact { .. });
+        self.active.iter().filter(may_open).any(is_deep)
     }
 
     /// Takes the motions along the contacts' directions to the bodies' trial positions.
@@ -137,7 +142,7 @@ impl ContactSystem {
         let reactions = self.collect_reactions(context);
         let mut motions = std::mem::take(&mut self.motions);
         motions.clear();
-        for constraint in &self.constraints[..self.active()] {
+        for ActiveContact { constraint, .. } in &self.active {
             let at_trial = |body: usize| &bodies[body].trial.x[..];
             let moved = relative_motion(constraint, bodies, at_trial, context, &reactions);
             motions.extend(constraint.directions().iter().map(|d| d.dot(&moved)));
@@ -156,25 +161,23 @@ impl ContactSystem {
 
     /// What makes gaps above their targets of motions.
     pub(super) fn add_targets(&self, motions: &mut [f64]) {
-        for (constraint, &first) in self.constraints.iter().zip(&self.dense.problem.offsets[..self.active()])
-        {
+        for ActiveContact { constraint, first, .. } in &self.active {
             // What the constraint itself gives way by is no motion of its ends.
-            motions[first] += constraint.target_gap + constraint.compliance * self.lambda[first];
+            motions[*first] += constraint.target_gap + constraint.compliance * self.lambda[*first];
         }
     }
 
     /// σ = μ‖slip‖ of contacts that carry, 0 of open ones; so much of it is taken.
     pub(super) fn update_shifts(&mut self, blend: f64) {
-        for i in 0..self.active() {
-            let first = self.dense.problem.offsets[i];
+        for contact in &mut self.active {
+            let rows = contact.rows();
             let mut shift = 0.0;
-            if let Law::Contact { friction } = self.constraints[i].law
-                && friction > 0.0
-                && self.lambda[first] > 0.0
+            if let (Law::Contact { friction }, [_, a, b]) = (contact.constraint.law, &self.gaps[rows])
+                && self.lambda[contact.first] > 0.0
             {
-                shift = friction * self.gaps[first + 1].hypot(self.gaps[first + 2]);
+                shift = friction * a.hypot(*b);
             }
-            self.shift[i] = blend * shift + (1.0 - blend) * self.shift[i];
+            contact.shift = blend * shift + (1.0 - blend) * contact.shift;
         }
     }
 }

@@ -2,6 +2,7 @@
 //! rigid bodies, every touched body solves once with its own factor, and its motion is read off at the contacts.
 
 use super::context::SolveContext;
+use super::lists::ActiveContact;
 use super::rigid_proxy::Reaction;
 use crate::contact::{Constraint, Endpoint};
 use crate::math::Vec3;
@@ -26,7 +27,7 @@ struct BodyResponse {
 
 /// W of these constraints.
 pub(super) struct MatrixFree<'a> {
-    pub constraints: &'a [Constraint],
+    pub contacts: &'a [ActiveContact],
     pub bodies: &'a mut [BodyProblem],
     pub factors: Factors<'a>,
     pub context: &'a SolveContext<'a>,
@@ -79,11 +80,8 @@ impl MatrixFree<'_> {
 impl ConeOperator for MatrixFree<'_> {
     fn multiply(&mut self, v: &[f64], out: &mut Vec<f64>) {
         self.begin();
-        let mut first = 0;
-        for constraint in self.constraints {
-            let rows = &v[first..first + constraint.dimension()];
-            first += rows.len();
-            self.scatter(constraint, rows);
+        for contact in self.contacts {
+            self.scatter(&contact.constraint, &v[contact.rows()]);
         }
         for (index, (body, response)) in self.bodies.iter_mut().zip(&mut self.response.bodies).enumerate() {
             if response.is_touched {
@@ -91,7 +89,7 @@ impl ConeOperator for MatrixFree<'_> {
             }
         }
         out.clear();
-        for constraint in self.constraints {
+        for ActiveContact { constraint, .. } in self.contacts {
             let [a, b] = &constraint.endpoints;
             let moved = self.motion(a) - self.motion(b);
             let normal = out.len();

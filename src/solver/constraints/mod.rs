@@ -8,6 +8,8 @@ mod elimination;
 
 mod groups;
 
+mod jacobian;
+
 mod delassus;
 
 mod matrix_free;
@@ -15,6 +17,10 @@ mod matrix_free;
 mod coarse_space;
 
 mod gaps;
+
+mod lists;
+
+mod activation;
 
 mod system;
 
@@ -27,6 +33,8 @@ mod without_matrix;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use activation::Slack;
 pub(crate) use context::{ContactLimits, SolveContext};
+pub(crate) use lists::ContactResult;
 pub(crate) use rigid_proxy::{Articulation, Reaction, RigidProxies, RigidProxy, Twist};
 pub(crate) use system::{Change, ContactSystem, ContactWork};

@@ -6,12 +6,13 @@
 
 use super::coarse_space::CoarseSpace;
 use super::context::SolveContext;
-use super::delassus::{Delassus, steady_geometry};
-use super::gaps::{end, relative_motion, shorter_edge, target_gap};
+use super::delassus::Delassus;
+use super::gaps::relative_motion;
 use super::groups::ContactGroups;
+use super::lists::{ActiveContact, Candidate, ContactResult};
 use super::matrix_free::Response;
 use super::rigid_proxy::{Reaction, RigidProxies};
-use crate::body::{ConstraintGeometry, ConstraintMemory};
+use crate::body::ConstraintMemory;
 use crate::contact::{Constraint, Endpoint, Law};
 use crate::math::Vec3;
 use crate::solver::body_step::BodyProblem;
@@ -20,24 +21,20 @@ use crate::solver::cone::{ConeMetric, ConeProblem, ConeSolver, ConeSweeps, Proje
 /// Contacts of the bodies of one island.
 #[derive(Default)]
 pub(crate) struct ContactSystem {
-    /// All that might touch; those that are in the problem first.
-    pub constraints: Vec<Constraint>,
-    active: usize,
-    /// Ends of the gaps of the others \[m\].
-    open: Vec<f64>,
-    /// Forces \[N\], packed as the problem is.
+    /// Those in the problem, in its order.
+    pub active: Vec<ActiveContact>,
+    /// Those that may close: activation moves them over.
+    pub candidates: Vec<Candidate>,
+    /// Forces \[N\], by rows as all that follows.
     pub lambda: Vec<f64>,
-    /// De Saxcé shift of each contact \[m\].
-    pub shift: Vec<f64>,
     /// Motions along the contacts' directions under the present forces, and what they leave of the gaps above their
     /// targets \[m\].
     pub(super) motions: Vec<f64>,
     pub(super) gaps: Vec<f64>,
     pub(super) before: Vec<f64>,
+    /// Shifts, by contacts.
     pub(super) shift_before: Vec<f64>,
     pub(super) reactions: Vec<Reaction>,
-    /// Where each contact acts, for W.
-    pub(super) geometry: Vec<ConstraintGeometry>,
     pub(super) groups: ContactGroups,
     pub(super) dense: DenseSolve,
     pub(super) free: FreeSolve,
@@ -115,30 +112,23 @@ const WITHIN_A_SHAPE: f64 = 1.0e-6;
 
 impl ContactSystem {
     pub fn is_empty(&self) -> bool {
-        self.constraints.is_empty()
+        self.active.is_empty() && self.candidates.is_empty()
     }
 
-    /// Number of contacts in the problem: they are the first of the constraints.
-    pub fn active(&self) -> usize {
-        self.active
+    /// Forgets the contacts.
+    pub fn clear(&mut self) {
+        self.active.clear();
+        self.candidates.clear();
     }
 
-    /// Packs the constraints for a step of `h` \[s\] that carried in the last one, or are shared, with their warm
-    /// starts, which are scattered to the nodes.
-    pub fn begin(&mut self, bodies: &mut [BodyProblem], context: &SolveContext<'_>) {
-        for constraint in &mut self.constraints {
-            constraint.target_gap = target_gap(constraint, bodies, context);
-        }
-        self.open.clear();
-        self.work = ContactWork::default();
-        self.renew_budget();
-        self.free.method.begin();
-        let carries =
-            |constraint: &Constraint| constraint.warm_force != Vec3::zeros() || constraint.key.is_shared();
-        self.constraints.sort_unstable_by_key(|constraint| !carries(constraint));
-        self.active = self.constraints.partition_point(carries);
-        self.pack(context);
-        self.scatter_contact_forces(bodies);
+    /// Adds a contact of the step to come.
+    pub fn push(&mut self, constraint: Constraint) {
+        self.candidates.push(Candidate::new(constraint));
+    }
+
+    /// All contacts, those in the problem first.
+    pub fn constraints(&self) -> impl Iterator<Item = &Constraint> + Clone {
+        self.active.iter().map(|c| &c.constraint).chain(self.candidates.iter().map(|c| &c.constraint))
     }
 
     /// What follows may take as much as a step.
@@ -150,59 +140,6 @@ impl ContactSystem {
     pub fn outdate(&mut self, change: Change) {
         self.dense.change = self.dense.change.max(change);
         self.free.change = self.free.change.max(change);
-    }
-
-    fn pack(&mut self, context: &SolveContext<'_>) {
-        self.outdate(Change::Contacts);
-        let constraints = &mut self.constraints[..self.active];
-        self.groups.arrange(constraints, context.proxies);
-        self.dense.problem.offsets.clear();
-        self.dense.problem.offsets.push(0);
-        self.dense.problem.laws.clear();
-        self.lambda.clear();
-        self.shift.clear();
-        self.geometry.clear();
-        for constraint in constraints {
-            self.geometry.push(steady_geometry(constraint, context.proxies));
-            self.lambda.extend(constraint.directions().iter().map(|d| d.dot(&constraint.warm_force)));
-            self.shift.push(constraint.warm_shift_rate * context.h);
-            self.dense.problem.offsets.push(self.lambda.len());
-            self.dense.problem.laws.push(constraint.law);
-        }
-    }
-
-    /// Activates constraints that end less than `slack`, in mean edges, from touching at the bodies'
-    /// trial positions under the present forces; true if there were such.
-    pub fn activate(&mut self, bodies: &[BodyProblem], context: &SolveContext<'_>, slack: f64) -> bool {
-        if self.active == self.constraints.len() {
-            return false;
-        }
-        let reactions = self.collect_reactions(context);
-        self.open.clear();
-        for constraint in &self.constraints[self.active..] {
-            self.open.push(end(constraint, bodies, context, &reactions));
-        }
-        self.reactions = reactions;
-        let closes = |constraint: &Constraint, end: f64| end < slack * shorter_edge(constraint, bodies);
-        let before = self.active;
-        for i in before..self.constraints.len() {
-            if closes(&self.constraints[i], self.open[i - before]) {
-                self.constraints.swap(self.active, i);
-                self.open.swap(self.active - before, i - before);
-                self.active += 1;
-            }
-        }
-        if self.active == before {
-            return false;
-        }
-        self.open.drain(..self.active - before);
-        for i in 0..before {
-            self.constraints[i].warm_force = self.force(i);
-            self.constraints[i].warm_shift_rate = self.shift[i] / context.h;
-            self.constraints[i].warm_geometry = Some(self.geometry[i]);
-        }
-        self.pack(context);
-        true
     }
 
     pub(super) fn collect_reactions(&mut self, context: &SolveContext<'_>) -> Vec<Reaction> {
@@ -218,11 +155,13 @@ impl ContactSystem {
     pub fn made_energy(&mut self, index: usize, bodies: &[BodyProblem], context: &SolveContext<'_>) -> f64 {
         let reactions = self.collect_reactions(context);
         let mut sum = 0.0;
-        for (i, constraint) in self.constraints[..self.active].iter().enumerate() {
+        for contact in &self.active {
+            let constraint = &contact.constraint;
             let is_contact = matches!(constraint.law, Law::Contact { .. });
             if is_contact && constraint.endpoints.iter().any(|endpoint| endpoint.is_of(index)) {
                 let at = |body: usize| &bodies[body].current.x[..];
-                sum += self.force(i).dot(&relative_motion(constraint, bodies, at, context, &reactions));
+                let moved = relative_motion(constraint, bodies, at, context, &reactions);
+                sum += contact.force(&self.lambda).dot(&moved);
             }
         }
         self.reactions = reactions;
@@ -233,24 +172,16 @@ impl ContactSystem {
     /// is drawn apart.
     pub fn restart(&mut self, index: usize) {
         let is_rigid = |endpoint: &Endpoint| !matches!(endpoint, Endpoint::Soft { .. });
-        for (i, constraint) in self.constraints.iter_mut().enumerate() {
-            let is_own = constraint.endpoints.iter().any(|endpoint| endpoint.is_of(index));
-            if is_own && constraint.compliance == 0.0 {
-                constraint.target_gap = if let Law::Bilateral { .. } = constraint.law {
-                    0.0
-                } else {
-                    constraint.target_gap.max(0.0)
-                };
-                // Within a rigid shape nothing moves, and W would be zero there.
-                if constraint.endpoints.iter().all(|endpoint| endpoint.is_of(index)) {
-                    constraint.compliance = WITHIN_A_SHAPE;
-                }
-            }
-            if i < self.active && (is_own || constraint.endpoints.iter().all(is_rigid)) {
-                self.lambda[self.dense.problem.offsets[i]..self.dense.problem.offsets[i + 1]].fill(0.0);
-                self.shift[i] = 0.0;
+        for contact in &mut self.active {
+            keep_together(&mut contact.constraint, index);
+            contact.in_matrix = None;
+            let endpoints = &contact.constraint.endpoints;
+            if endpoints.iter().any(|endpoint| endpoint.is_of(index)) || endpoints.iter().all(is_rigid) {
+                self.lambda[contact.rows()].fill(0.0);
+                contact.shift = 0.0;
             }
         }
+        self.candidates.iter_mut().for_each(|candidate| keep_together(&mut candidate.constraint, index));
     }
 
     /// Lays the forces on the nodes; what that changes goes to the bodies' `contact_change`.
@@ -267,13 +198,13 @@ impl ContactSystem {
     }
 
     /// Lays the forces on the nodes.
-    fn scatter_contact_forces(&self, bodies: &mut [BodyProblem]) {
+    pub(super) fn scatter_contact_forces(&self, bodies: &mut [BodyProblem]) {
         for body in bodies.iter_mut() {
             body.contact_force.fill(Vec3::zeros());
         }
-        for (i, constraint) in self.constraints[..self.active].iter().enumerate() {
-            let force = self.force(i);
-            for (endpoint, sign) in constraint.endpoints.iter().zip([1.0, -1.0]) {
+        for contact in &self.active {
+            let force = contact.force(&self.lambda);
+            for (endpoint, sign) in contact.constraint.endpoints.iter().zip([1.0, -1.0]) {
                 if let Endpoint::Soft { body, .. } = endpoint {
                     for (node, weight) in endpoint.soft_nodes() {
                         bodies[*body].contact_force[node] += force * (sign * weight);
@@ -283,40 +214,48 @@ impl ContactSystem {
         }
     }
 
-    /// Force \[N\] of contact `i` on its endpoint 0.
-    pub fn force(&self, i: usize) -> Vec3 {
-        if i >= self.active {
-            return Vec3::zeros();
-        }
-        self.constraints[i]
-            .force(&self.lambda[self.dense.problem.offsets[i]..self.dense.problem.offsets[i + 1]])
+    /// What became of every contact.
+    pub fn results(&self) -> impl Iterator<Item = ContactResult<'_>> {
+        let active = self.active.iter();
+        let active = active.map(|contact| {
+            let force = contact.force(&self.lambda);
+            ContactResult::new(&contact.constraint, force, self.gaps[contact.first])
+        });
+        let open = self.candidates.iter();
+        active.chain(open.map(|c| ContactResult::new(&c.constraint, Vec3::zeros(), c.end)))
     }
 
-    /// What contact `i` of the problem leaves to the next step.
-    pub fn memory(&self, i: usize, h: f64) -> ConstraintMemory {
-        let (key, geometry) = (self.constraints[i].key, self.geometry[i]);
-        ConstraintMemory { key, force: self.force(i), shift_rate: self.shift[i] / h, geometry }
-    }
-
-    /// Gap \[m\] of contact `i` at the end of the step.
-    pub fn final_gap(&self, i: usize) -> f64 {
-        let above_target = match i.checked_sub(self.active) {
-            Some(place) => self.open[place],
-            None => self.gaps[self.dense.problem.offsets[i]],
-        };
-        above_target - self.constraints[i].target_gap + self.constraints[i].gap
+    /// What a contact of the problem leaves to the next step.
+    pub fn memory(&self, contact: &ActiveContact, h: f64) -> ConstraintMemory {
+        let ActiveContact { constraint, geometry, shift, .. } = contact;
+        let force = contact.force(&self.lambda);
+        ConstraintMemory { key: constraint.key, force, shift_rate: shift / h, geometry: *geometry }
     }
 
     /// Adds what the contacts do to the proxies over the step.
     pub fn add_reactions(&self, proxies: &RigidProxies, h: f64, reactions: &mut [Reaction]) {
-        for (i, constraint) in self.constraints[..self.active].iter().enumerate() {
-            let force = self.force(i);
+        for contact in &self.active {
+            let force = contact.force(&self.lambda);
             if force == Vec3::zeros() {
                 continue;
             }
-            for (endpoint, sign) in constraint.endpoints.iter().zip([1.0, -1.0]) {
+            for (endpoint, sign) in contact.constraint.endpoints.iter().zip([1.0, -1.0]) {
                 proxies.add_reaction(endpoint, &(force * sign), h, reactions);
             }
         }
+    }
+}
+
+/// Within what begins anew nothing is drawn apart.
+fn keep_together(constraint: &mut Constraint, index: usize) {
+    let is_own = |endpoint: &Endpoint| endpoint.is_of(index);
+    if constraint.compliance != 0.0 || !constraint.endpoints.iter().any(is_own) {
+        return;
+    }
+    let is_bilateral = matches!(constraint.law, Law::Bilateral { .. });
+    constraint.target_gap = if is_bilateral { 0.0 } else { constraint.target_gap.max(0.0) };
+    // Within a rigid shape nothing moves, and W would be zero there.
+    if constraint.endpoints.iter().all(is_own) {
+        constraint.compliance = WITHIN_A_SHAPE;
     }
 }

@@ -1,11 +1,58 @@
 //! Products without W against W.
 
 use super::context::SolveContext;
+use super::delassus::{ContactRows, Delassus};
 use super::improve::Around;
 use super::matrix_free::MatrixFree;
+use super::{Change, Slack};
 use crate::solver::body_step::{Factors, NewtonFactors};
 use crate::solver::cone::{ConeOperator, ConeTolerance};
 use crate::solver::island_tests::{H, LIMITS, plate, touching};
+use crate::solver::linear::BlockMatrix;
+
+const ALL: Slack = Slack { edges: f64::INFINITY, motions: 0.0 };
+
+/// Frames of bodies, factors and contacts that enter: W as it was, where nothing has changed, is W made anew.
+#[test]
+fn a_matrix_taken_over_is_bit_by_bit_that_made_anew() {
+    let proxies = plate();
+    let (cache, mut island) = touching();
+    let context = SolveContext { factors: &cache, proxies: &proxies, h: H, limits: &LIMITS };
+    let newton = NewtonFactors::default();
+    let factors = Factors { cache: &cache, newton: &newton };
+    let (bodies, system) = (&mut island.bodies, &mut island.contacts);
+    system.begin(bodies, &context);
+    for body in bodies.iter_mut() {
+        body.trial.x.clone_from(&body.current.x);
+    }
+    let tolerance = ConeTolerance { relative: 1e-12, floor: 1e-9 };
+    let around = Around { factors, context: &context, tolerance };
+    let mut late = system.candidates.split_off(system.candidates.len() / 2);
+    assert!(system.activate(bodies, &context, ALL) && late.len() > 2);
+    system.assemble(bodies, around);
+    let mut kept = 0;
+    for round in 0..4 {
+        if round == 2 {
+            // P itself is another one: nothing may be kept.
+            bodies[0].step_damping = 3.0;
+            system.outdate(Change::Factors);
+        } else {
+            system.candidates.extend(late.pop());
+            assert!(system.activate(bodies, &context, ALL));
+        }
+        kept += system.active.iter().filter(|contact| contact.in_matrix.is_some()).count();
+        system.assemble(bodies, around);
+        let (mut anew, mut W) = (Delassus::default(), BlockMatrix::default());
+        let (contacts, groups) = (&mut system.active[..], &system.groups);
+        let rows = ContactRows { contacts, offsets: &system.dense.problem.offsets, groups };
+        assert!(anew.update(&mut W, rows, bodies, factors, &proxies, H));
+        assert_eq!(W.pattern(), system.dense.problem.W.pattern());
+        for k in 0..W.pattern().pairs.len() {
+            assert_eq!(W.block(k), system.dense.problem.W.block(k), "block {k} of round {round}");
+        }
+    }
+    assert!(kept > 8);
+}
 
 #[test]
 fn a_product_without_the_matrix_is_that_of_the_matrix() {
@@ -20,7 +67,7 @@ fn a_product_without_the_matrix_is_that_of_the_matrix() {
         body.trial.x.clone_from(&body.current.x);
         body.step_damping = 2.0;
     }
-    assert!(system.activate(bodies, &context, f64::INFINITY));
+    assert!(system.activate(bodies, &context, ALL));
     let tolerance = ConeTolerance { relative: 1e-12, floor: 1e-9 };
     system.assemble(bodies, Around { factors, context: &context, tolerance });
     let rows = system.dense.problem.rows();
@@ -28,9 +75,9 @@ fn a_product_without_the_matrix_is_that_of_the_matrix() {
     let v: Vec<f64> = (0..rows).map(|k| ((k * 37 % 101) as f64 - 50.0) * 0.1).collect();
     let (mut by_matrix, mut free) = (Vec::new(), Vec::new());
     system.dense.problem.multiply(&v, &mut by_matrix);
-    let constraints = &system.constraints[..system.active()];
+    let contacts = &system.active;
     let response = &mut system.free.response;
-    MatrixFree { constraints, bodies, factors, context: &context, response }.multiply(&v, &mut free);
+    MatrixFree { contacts, bodies, factors, context: &context, response }.multiply(&v, &mut free);
     let largest = by_matrix.iter().fold(0.0f64, |a, b| a.max(b.abs()));
     for (a, b) in by_matrix.iter().zip(&free) {
         // Sums of some hundred terms.

@@ -23,13 +23,12 @@ impl ContactSystem {
         let dense = &mut self.dense;
         if change > Change::Forces {
             let rows = ContactRows {
-                constraints: &self.constraints[..self.geometry.len()],
-                geometry: &self.geometry,
+                contacts: &mut self.active,
                 offsets: &dense.problem.offsets,
                 groups: &self.groups,
             };
             let W = &mut dense.problem.W;
-            if dense.delassus.update(W, &rows, bodies, factors, context.proxies, context.h) {
+            if dense.delassus.update(W, rows, bodies, factors, context.proxies, context.h) {
                 dense.problem.groups.clone_from(&self.groups.starts);
                 dense.problem.filled.clone_from(&self.groups.filled);
                 dense.problem.version += 1;
@@ -44,10 +43,10 @@ impl ContactSystem {
     /// Lets Newton's method begin where the last forces and slips were, and where the bodies' trial positions are.
     fn predict(&mut self, bodies: &[BodyProblem], context: &super::SolveContext<'_>) {
         let reactions = self.collect_reactions(context);
-        let constraints = &self.constraints;
-        let end = |i: usize| end(&constraints[i], bodies, context, &reactions);
+        let active = &self.active;
+        let end = |i: usize| end(&active[i].constraint, bodies, context, &reactions);
         let dense = &mut self.dense;
-        dense.solver.predict(&dense.problem, &self.lambda, &self.shift, end);
+        dense.solver.predict(&dense.problem, &self.lambda, |i| active[i].shift, end);
         self.reactions = reactions;
     }
 
@@ -60,19 +59,18 @@ impl ContactSystem {
     ) -> Option<bool> {
         self.assemble(bodies, around);
         self.before.clone_from(&self.lambda);
-        self.shift_before.clone_from(&self.shift);
+        self.shift_before.clear();
+        self.shift_before.extend(self.active.iter().map(|contact| contact.shift));
         let mut g_free = std::mem::take(&mut self.dense.g_free);
         g_free.clear();
         g_free.extend(self.motions.iter().zip(&self.dense.slips).map(|(motion, slip)| motion - slip));
         self.add_targets(&mut g_free);
         self.dense.g_free = g_free;
-        let slides = self.constraints[..self.active()].iter().any(|constraint| constraint.dimension() == 3);
+        let slides = self.active.iter().any(|contact| contact.constraint.dimension() == 3);
         for _ in 0..if slides { SHIFT_ROUNDS } else { 1 } {
             let dense = &mut self.dense;
             dense.problem.g.clone_from(&dense.g_free);
-            for (shift, first) in self.shift.iter().zip(&dense.problem.offsets) {
-                dense.problem.g[*first] += shift;
-            }
+            self.active.iter().for_each(|contact| dense.problem.g[contact.first] += contact.shift);
             let (lambda, product) = (&mut self.lambda, &mut dense.slips);
             let done = dense.solver.solve(&dense.problem, lambda, product, around.tolerance, effort);
             self.work.newton_steps += done.newton_steps;
@@ -81,7 +79,8 @@ impl ContactSystem {
             self.spent.operations += done.factorizations * self.groups.factor_work();
             if done.failures > 0 && effort != Effort::Full {
                 self.lambda.clone_from(&self.before);
-                self.shift.clone_from(&self.shift_before);
+                let shifts = self.active.iter_mut().zip(&self.shift_before);
+                shifts.for_each(|(contact, before)| contact.shift = *before);
                 self.outdate(Change::Forces);
                 return None;
             }

@@ -51,8 +51,7 @@ impl ContactSystem {
         // Any metric serves; frames that turn within a step do not matter to it.
         if self.free.change >= Change::Factors {
             let parts = CoarseParts { bodies, factors, proxies: context.proxies, h: context.h };
-            let constraints = &self.constraints[..self.active()];
-            self.free.coarse.update(&mut self.free.metric, constraints, parts);
+            self.free.coarse.update(&mut self.free.metric, &self.active, parts);
             self.free.change = Change::Nothing;
         }
     }
@@ -66,9 +65,7 @@ impl ContactSystem {
     fn shift_gradient(&mut self, tolerance: ConeTolerance) {
         let free = &mut self.free;
         free.r.clone_from(&self.gaps);
-        for (contact, shift) in free.metric.contacts.iter().zip(&self.shift) {
-            free.r[contact.first] += shift;
-        }
+        self.active.iter().for_each(|contact| free.r[contact.first] += contact.shift);
         self.work.error = free.metric.error(&self.lambda, &free.r, tolerance);
     }
 
@@ -80,10 +77,9 @@ impl ContactSystem {
         aim: Aim,
     ) -> bool {
         self.before.clone_from(&self.lambda);
-        let active = self.active();
         let free = &mut self.free;
         let mut operator = MatrixFree {
-            constraints: &self.constraints[..active],
+            contacts: &self.active,
             bodies: &mut *bodies,
             factors,
             context,

@@ -6,6 +6,7 @@
 use super::factor::{DenseScratch, cholesky, solve_from_right, subtract_product};
 use super::factor_values::NotPositiveDefinite;
 use crate::math::dense;
+use crate::threads::for_each_part;
 
 /// Which blocks there are.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -70,6 +71,16 @@ impl BlockMatrix {
 
     pub fn block_mut(&mut self, k: usize) -> &mut [f64] {
         &mut self.values[self.offsets[k]..self.offsets[k + 1]]
+    }
+
+    /// The place of a block (row group, column group), if it is there.
+    pub fn find(&self, row: usize, column: usize) -> Option<usize> {
+        self.pattern.pairs.binary_search_by_key(&(column, row), |&(i, j)| (j, i)).ok()
+    }
+
+    /// Calls `f` with the place and the values of every block, on several threads.
+    pub fn for_each_block(&mut self, f: impl Fn(usize, &mut [f64]) + Sync) {
+        for_each_part(&mut self.values, &self.offsets, &f);
     }
 
     /// The diagonal, row by row.

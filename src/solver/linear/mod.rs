@@ -35,7 +35,7 @@ pub(crate) use factor::{FactorScratch, Symbolic};
 pub(crate) use rigid_mode::rigid_mobility;
 
 pub(crate) use factor_cache::{FactorCache, FactorId, SystemFactor};
-pub(crate) use preconditioner::Preconditioner;
+pub(crate) use preconditioner::{BlockForm, Preconditioner};
 pub(crate) use system::{FactorKey, assemble_tangent};
 pub(crate) use unused_factors::STEPS_KEPT;
 #[cfg(test)]

@@ -39,6 +39,19 @@ pub(crate) struct Preconditioner {
     scratch: FactorScratch,
     /// Of the solves.
     pub counters: SolveCounters,
+    /// Another one whenever P is.
+    pub version: u64,
+}
+
+/// How the blocks of P follow from those of the inverse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum BlockForm {
+    /// By one frame.
+    OneFrame(Mat3),
+    /// By the frames of both nodes, and what [`Preconditioner::deflated`] adds.
+    NodeFrames,
+    /// As [`Preconditioner::compliance`] says.
+    Other,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,8 +83,17 @@ struct Deflation {
     column: Vec<Vec3>,
 }
 
+impl Deflation {
+    /// What is the same in all blocks; symmetric.
+    fn rigid(&self) -> Mat3 {
+        let mass = self.total_mass;
+        self.mean / (mass * mass) + Mat3::from_diagonal_element(self.mobility / mass)
+    }
+}
+
 impl Preconditioner {
     fn begin(&mut self, kind: FrameKind) {
+        self.version += 1;
         self.kind = kind;
         self.turns = false;
         self.drifts = false;
@@ -98,6 +120,7 @@ impl Preconditioner {
 
     /// Lets the clusters of the Laplacian turn along, if the factor has such, from where they are at `x`.
     pub fn set_clusters(&mut self, factor: &SystemFactor, x: &[Vec3]) {
+        self.version += 1;
         let clusters = factor.clusters.as_ref();
         self.turns = clusters.is_some_and(|clusters| self.clusters.turn(clusters, x));
     }
@@ -135,6 +158,7 @@ impl Preconditioner {
         mobilities: [f64; 2],
         resists_rotation: bool,
     ) {
+        self.version += 1;
         self.drift.set(rest, masses, mobilities[0] - mobilities[1]);
         if resists_rotation {
             self.drift.hold_rotation();
@@ -164,6 +188,7 @@ impl Preconditioner {
 
     /// Puts the translation mode back, of free bodies with frames per node or without a factor.
     pub fn deflate(&mut self, masses: &[f64], mobility: f64, factor: &SystemFactor) {
+        self.version += 1;
         let frames = match self.kind {
             FrameKind::PerNode => &self.per_node[..],
             _ => std::slice::from_ref(&self.floating),
@@ -288,9 +313,25 @@ impl Preconditioner {
         if !d.active {
             return block;
         }
-        let rigid =
-            d.mean / (d.total_mass * d.total_mass) + Mat3::from_diagonal_element(d.mobility / d.total_mass);
-        block - (d.coupling[i] + d.coupling[j].transpose()) / d.total_mass + rigid
+        block - (d.coupling[i] + d.coupling[j].transpose()) / d.total_mass + d.rigid()
+    }
+
+    /// How blocks of P are made.
+    pub fn block_form(&self) -> BlockForm {
+        match (self.one_frame(), self.kind) {
+            (Some(frame), _) => BlockForm::OneFrame(frame),
+            (None, FrameKind::PerNode) => BlockForm::NodeFrames,
+            _ => BlockForm::Other,
+        }
+    }
+
+    /// What deflation adds to the block between nodes i and j is the sum of D_i and the transpose of D_j \[m/N\].
+    pub fn deflated(&self, i: usize) -> Mat3 {
+        let d = &self.deflation;
+        if !d.active {
+            return Mat3::zeros();
+        }
+        d.rigid() * 0.5 - d.coupling[i] / d.total_mass
     }
 
     /// The one frame of the body, if it has one and that is all there is to its blocks.
