@@ -16,7 +16,7 @@ pub(crate) struct SurfaceTree {
 }
 
 /// Rounding of `f32` coordinates, relative to them.
-const ROUNDING: f32 = 2.5e-7;
+pub(super) const ROUNDING: f32 = 2.5e-7;
 
 impl SurfaceTree {
     /// Refits to the facets on their way from `x` to `target`, with `margin` \[m\] around them.
