@@ -108,7 +108,8 @@ mod tests {
         let count = places.len();
         match change {
             Change::Drift(way) => {
-                let turned = |k: usize| if k % 2 == 0 { way } else { Vector::new(way.z, -way.x, way.y) };
+                let turned =
+                    |k: usize| if k.is_multiple_of(2) { way } else { Vector::new(way.z, -way.x, way.y) };
                 (0..count).for_each(|k| places[k] += turned(k));
             }
             Change::Teleport(k, to) if count > 0 => places[k % count] = to,
