@@ -49,6 +49,58 @@ fn a_fresh_pipeline_in_every_step_has_the_same_bits() {
     assert_eq!(run(90, |_| ()), fresh);
 }
 
+/// Bodies among moving boxes that come and go, jump, sleep and are woken.
+fn comings_and_goings(fresh: bool) -> Vec<Vec<DeformableState>> {
+    let (mut physics, _) = world_with_floor(1.0 / 60.0);
+    let mut world = DeformableWorld::new();
+    // More obstacles than a list is for.
+    for k in 0..48u8 {
+        let at = Vector::new(
+            f32::from(k % 8) * 0.3 - 1.0,
+            1.2 + 0.2 * f32::from(k % 3),
+            f32::from(k / 8) * 0.3 - 0.7,
+        );
+        let body = RigidBodyBuilder::dynamic().translation(at).linvel(Vector::X * 0.2 * f32::from(k % 5));
+        physics.insert(body, ColliderBuilder::cuboid(0.05, 0.04, 0.06).density(300.0));
+    }
+    let cube = |k: u8| {
+        let at = Vector::new(0.25 * f32::from(k % 3), 0.11 + 0.22 * f32::from(k / 3), 0.02 * f32::from(k));
+        let material = DeformableMaterial::new(3e5, 0.3).friction(0.5).mass_damping(4.0);
+        DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2; 3]).translation(at).material(material)
+    };
+    let mut handles: Vec<_> = (0..6).map(|k| world.insert(cube(k)).unwrap()).collect();
+    let (mut seen, mut sleeping) = (Vec::new(), 0);
+    for step in 0..300u32 {
+        match step {
+            // Over the others, which wake as it lands.
+            40 | 180 => {
+                let up = Pose::from_translation(Vector::Y * 0.6);
+                world.bodies[handles[1]].teleport(up).unwrap();
+            }
+            70 => drop(world.remove(handles.remove(2))),
+            90 => handles.push(world.insert(cube(7)).unwrap()),
+            120 => (0..handles.len()).skip(1).for_each(|k| drop(world.remove(handles[k]))),
+            130 => handles = vec![handles[0], world.insert(cube(4)).unwrap(), world.insert(cube(2)).unwrap()],
+            _ => {}
+        }
+        if fresh {
+            world.pipeline = DeformablePipeline::new();
+        }
+        world.step(&mut physics);
+        sleeping = sleeping.max(world.counters().sleeping);
+        seen.push(states(&world));
+    }
+    assert!(world.counters().obstacles > 40 && sleeping > 0);
+    seen
+}
+
+#[test]
+fn what_is_kept_of_bodies_that_come_go_and_jump_changes_no_bits() {
+    let (kept, fresh) = (comings_and_goings(false), comings_and_goings(true));
+    let first = (0..kept.len()).find(|&step| kept[step] != fresh[step]);
+    assert_eq!(first, None, "the first step that differs");
+}
+
 #[cfg(feature = "parallel")]
 #[test]
 fn any_number_of_threads_has_the_same_bits() {

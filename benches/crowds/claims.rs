@@ -11,6 +11,7 @@ pub const WORST: &str = "worst over rapier's";
 pub const MEDIAN: &str = "median over rapier's";
 pub const P99: &str = "99 % over rapier's";
 pub const WORST_TO_SETTLED: &str = "worst over settled";
+pub const DETECTION: &str = "detection over step";
 pub const ASLEEP: &str = "asleep after, s";
 pub const TOUCH: &str = "touch over rest";
 pub const BYTES: &str = "peak bytes over twice factor and state";
@@ -38,9 +39,11 @@ const CLAIMS: &[Claim] = &[
     claim("heap of 16 cubes", WORST, 0.55),
     claim("heap of 16 cubes", WORST_TO_SETTLED, 6.2),
     claim("heap of 16 cubes", ASLEEP, 2.2),
+    claim("heap of 16 cubes", DETECTION, 0.16),
     claim("heap of 48 cubes", MEAN, 0.48),
     claim("heap of 48 cubes", WORST, 0.53),
     claim("heap of 48 cubes", WORST_TO_SETTLED, 2.4),
+    claim("heap of 48 cubes", DETECTION, 0.12),
     claim("pinch at 5 m/s", WORST_TO_SETTLED, 40.0),
     claim("first touch, 13720 tets", TOUCH, 7.3),
     claim("first touch, 13720 tets", BYTES, 0.5),

@@ -27,6 +27,12 @@ fn deep(run: &Run) -> String {
     format!("{ever:.1e} m deep in something rigid, {end:.1e} at the end")
 }
 
+/// Its share of our steps.
+fn detection(run: &Run) -> f64 {
+    let all: f64 = run.counters.iter().map(|c| c.total_time().as_secs_f64()).sum();
+    run.counters.iter().map(|c| c.detection_time.as_secs_f64()).sum::<f64>() / all
+}
+
 pub fn heaps(all: bool, report: &mut Report) {
     let counts: &[usize] = if all { &[16, 48, 100, 200] } else { &[16, 48] };
     for &count in counts {
@@ -34,7 +40,10 @@ pub fn heaps(all: bool, report: &mut Report) {
         let runs = both(&scene);
         let ratios = compare(&scene, &runs, report);
         let [ours, theirs] = &runs;
-        report.line(&scene, Engine::Foible, ours, &format!("{ratios}; {}", deep(ours)));
+        let detection = detection(ours);
+        report.measure(&scene.name, DETECTION, detection);
+        let detection = format!("detection {:.1} %", 1e2 * detection);
+        report.line(&scene, Engine::Foible, ours, &format!("{ratios}; {detection}; {}", deep(ours)));
         report.line(&scene, Engine::Rapier, theirs, &deep(theirs));
         report.worst_steps(&scene.name, ours, 3);
         sleep(count, ours, report);

@@ -1,40 +1,28 @@
-//! Which obstacles come near a body: a bounding volume hierarchy over what stands still, a list of
-//! what moves.
+//! Which obstacles come near a body.
 
+use super::box_tree::BoxTree;
 use super::obstacle::Obstacle;
 use crate::math::{Vec3, to_real};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
-use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d::query::PointQuery;
 
-/// The broad phase over the obstacles of a step. The tree is kept while nothing in it changes.
+/// The broad phase over the obstacles of a step.
 #[derive(Default)]
 pub(crate) struct Candidates {
-    still: Vec<(u32, Aabb)>,
-    moving: Vec<(u32, Aabb)>,
-    tree: Option<Bvh>,
-    tree_leaves: Vec<(u32, Aabb)>,
+    boxes: Vec<Aabb>,
+    tree: BoxTree,
 }
 
-/// Below this number of still obstacles a list is faster than a tree.
+/// Below this number of obstacles a list is faster than a tree.
 const FEW: usize = 32;
 
 impl Candidates {
-    /// Refits to the obstacles of this step.
+    /// Takes the obstacles of this step.
     pub fn update(&mut self, obstacles: &[Obstacle]) {
-        self.still.clear();
-        self.moving.clear();
-        for (i, obstacle) in obstacles.iter().enumerate() {
-            let moves = obstacle.start != obstacle.end;
-            let list = if moves { &mut self.moving } else { &mut self.still };
-            list.push((i as u32, obstacle.swept_aabb()));
-        }
-        if self.still.len() < FEW {
-            self.tree = None;
-        } else if self.tree.is_none() || self.tree_leaves != self.still {
-            let leaves = self.still.iter().map(|(i, aabb)| (*i as usize, *aabb));
-            self.tree = Some(Bvh::from_iter(BvhBuildStrategy::Binned, leaves));
-            self.tree_leaves.clone_from(&self.still);
+        self.boxes.clear();
+        self.boxes.extend(obstacles.iter().map(Obstacle::swept_aabb));
+        if self.boxes.len() >= FEW {
+            self.tree.update(&self.boxes);
         }
     }
 
@@ -72,13 +60,11 @@ impl Candidates {
     /// Obstacles whose boxes meet `aabb`, ascending.
     pub fn near(&self, aabb: &Aabb, found: &mut Vec<u32>) {
         found.clear();
-        let meets = |list: &[(u32, Aabb)], found: &mut Vec<u32>| {
-            found.extend(list.iter().filter(|(_, b)| b.intersects(aabb)).map(|(i, _)| *i));
-        };
-        meets(&self.moving, found);
-        match &self.tree {
-            Some(tree) => found.extend(tree.intersect_aabb(aabb)),
-            None => meets(&self.still, found),
+        let meets = |o: &u32| self.boxes[*o as usize].intersects(aabb);
+        if self.boxes.len() < FEW {
+            found.extend((0..self.boxes.len() as u32).filter(meets));
+        } else {
+            found.extend(self.tree.near(aabb).filter(meets));
         }
         found.sort_unstable();
     }

@@ -8,7 +8,6 @@ use super::thin_contact::segment_point;
 use super::triangle_contact::triangle_point;
 use crate::body::{ConstraintKey, ConstraintMemory, Feature};
 use crate::math::{Vec3, to_real};
-use crate::mesh::NONE;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 
 /// Slot of the first closest point on a feature; those before are nodes, rims and corners.
@@ -57,15 +56,17 @@ impl Detector {
 
     pub(super) fn detect_triangles(&mut self, scene: &PairScene<'_>, constraints: &mut Vec<Constraint>) {
         let surface = &scene.model.surface;
-        for (t, triangle) in surface.triangles.iter().enumerate() {
+        for k in 0..self.near.len() {
+            let (t, aabb) = (self.near[k].0 as usize, self.near[k].1);
+            let triangle = &surface.triangles[t];
             let s = triangle.map(|n| surface.index_of_node[n as usize] as usize);
             let corners = s.map(|s| self.local[s]);
             let reach = s.iter().fold(0.0, |a: f64, &s| a.max(self.reach[s])) + scene.motion;
-            let around = self.boxes[t].loosened(reach as f32);
+            let around = aabb.loosened(reach as f32);
             if !around.intersects(&scene.extent) || self.lies_under_one_face(&s) {
                 continue;
             }
-            let edges = surface.triangle_edges[t].map(|e| &self.edges[e as usize]);
+            let edges = surface.triangle_edges[t].map(|e| self.on_edge(e));
             let standing = self.standing.iter().filter(|(on, _)| *on == t).map(|(_, constraint)| constraint);
             let known = s.iter().filter_map(|&s| self.nodes[s].as_ref());
             let [e0, e1, e2] = surface.triangle_edges[t].map(Feature::Edge);
@@ -92,8 +93,11 @@ impl Detector {
     /// Contacts inside the segments of rods.
     pub(super) fn detect_segments(&mut self, scene: &PairScene<'_>, constraints: &mut Vec<Constraint>) {
         let surface = &scene.model.surface;
-        let alone = surface.edge_triangles.iter().enumerate().filter(|(_, sides)| sides[0] == NONE);
-        for (e, _) in alone {
+        for &e in &surface.segments {
+            let e = e as usize;
+            if self.are_beyond(surface, &surface.edges[e]) {
+                continue;
+            }
             let s = surface.edges[e].map(|n| surface.index_of_node[n as usize] as usize);
             let ends = s.map(|s| self.local[s]);
             let reach = self.reach[s[0]].max(self.reach[s[1]]) + scene.motion;
@@ -105,7 +109,8 @@ impl Detector {
             let skin =
                 surface.edges[e].iter().map(|&n| scene.model.half_thickness[n as usize]).fold(0.0, f64::max);
             let points = self.points.iter().filter(|p| p.0 == feature).map(|p| &p.2);
-            let known = s.iter().filter_map(|&s| self.nodes[s].as_ref()).chain(&self.edges[e]).chain(points);
+            let known =
+                s.iter().filter_map(|&s| self.nodes[s].as_ref()).chain(self.on_edge(e as u32)).chain(points);
             if let Some((t, found)) = segment_point(scene.obstacle, &ends, known, reach, skin, &scene.scales)
             {
                 let [a, b] = surface.edges[e];

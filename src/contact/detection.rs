@@ -5,11 +5,12 @@ use super::obstacle::Obstacle;
 use super::pair_scene::{Pair, PairScene, near, one_constraint_per_feature};
 use super::rim_contact::{corner_on_triangle, corners_in, rim_crossing};
 use super::surface_point::{SurfacePoint, surface_point};
+use super::surface_tree::ROUNDING;
 use super::thin_contact::{looks_away, side_of_node};
 use crate::body::{ConstraintMemory, Feature};
 use crate::fem::DeformableModel;
-use crate::math::{Vec3, to_real};
-use crate::mesh::NONE;
+use crate::math::{Vec3, from_real, to_real};
+use crate::mesh::{NONE, Surface};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 
 /// Part of the mean edge within which contacts are looked for even without motion.
@@ -26,11 +27,16 @@ pub(crate) struct Detector {
     motions: Vec<Vec3>,
     /// Per surface node, in the obstacle's frame.
     pub(super) local: Vec<Vec3>,
-    /// Box of each triangle, in that frame.
-    pub(super) boxes: Vec<Aabb>,
+    /// Per surface node, beyond which sides of the obstacle's box it is, by more than anything may reach.
+    beyond: Vec<u8>,
+    /// Triangles that are not wholly beyond one of them, ascending, and their boxes in the obstacle's frame.
+    pub(super) near: Vec<(u32, Aabb)>,
     pub(super) nodes: Vec<Option<SurfacePoint>>,
-    /// Rim crossings found per edge.
-    pub(super) edges: Vec<Option<SurfacePoint>>,
+    /// Surface nodes that have a point.
+    found: Vec<u32>,
+    near_edges: Vec<u32>,
+    /// Rim crossings, ascending by their edges.
+    edges: Vec<(u32, SurfacePoint)>,
     /// Corners of the obstacle, and which triangle each stands on.
     corners: Vec<(u32, Vec3)>,
     pub(super) standing: Vec<(usize, SurfacePoint)>,
@@ -58,6 +64,9 @@ impl Detector {
             // None for a triangle that has shrunk to nothing.
             self.faces.push(area.try_normalize(0.0).unwrap_or_default());
         }
+        self.nodes.clear();
+        self.nodes.resize(surface.nodes.len(), None);
+        self.found.clear();
         // A node whose triangles cancel has no outside; any direction serves.
         self.normals.iter_mut().for_each(|n| *n = n.try_normalize(0.0).unwrap_or(Vec3::y()));
         let margin = STATIC_MARGIN * surface.mean_edge;
@@ -91,15 +100,12 @@ impl Detector {
         let to_local = |n: &u32| obstacle.start.inverse_transform(&x[*n as usize]);
         self.local.clear();
         self.local.extend(surface.nodes.iter().map(to_local));
-        let scene = PairScene::new(pair, obstacle, model, x);
+        let scene = PairScene::new(pair, obstacle, model, x, &self.local);
+        self.find_beyond(&scene);
         self.detect_nodes(&scene, memory, constraints);
         let kind = obstacle.kind();
         if !kind.is_plane {
-            let corner = |n: &u32| to_real(&self.local[surface.index_of_node[*n as usize] as usize]);
-            let boxes =
-                surface.triangles.iter().map(|triangle| Aabb::from_points(triangle.iter().map(corner)));
-            self.boxes.clear();
-            self.boxes.extend(boxes);
+            self.list_near(surface);
             self.detect_rims(&scene, constraints);
             self.detect_corners(&scene, constraints);
             self.keep_points(&scene, memory, constraints);
@@ -112,6 +118,54 @@ impl Detector {
         constraints[first..].sort_unstable_by_key(|r| r.key);
     }
 
+    /// How far anything of the body and the obstacle may come towards each other \[m\].
+    fn farthest_reach(&self, scene: &PairScene<'_>) -> f64 {
+        self.reach.iter().fold(0.0, |a: f64, b| a.max(*b)) + scene.motion
+    }
+
+    fn find_beyond(&mut self, scene: &PairScene<'_>) {
+        let (low, high) = (from_real(scene.extent.mins), from_real(scene.extent.maxs));
+        let reach = self.farthest_reach(scene);
+        let reach = reach + f64::from(ROUNDING) * (low.abs().max().max(high.abs().max()) + reach);
+        let (low, high) = (low.add_scalar(-reach), high.add_scalar(reach));
+        let sides = |p: &Vec3| {
+            let sides = (0..3).map(|k| u8::from(p[k] < low[k]) << k | u8::from(p[k] > high[k]) << (k + 3));
+            sides.fold(0, |all, side| all | side)
+        };
+        self.beyond.clear();
+        self.beyond.extend(self.local.iter().map(sides));
+    }
+
+    /// Whether all of some nodes are beyond one side of the obstacle.
+    pub(super) fn are_beyond(&self, surface: &Surface, nodes: &[u32]) -> bool {
+        let beyond = |n: &u32| self.beyond[surface.index_of_node[*n as usize] as usize];
+        nodes.iter().fold(u8::MAX, |sides, n| sides & beyond(n)) != 0
+    }
+
+    /// Lists the triangles and the edges that are not.
+    fn list_near(&mut self, surface: &Surface) {
+        let mut near = std::mem::take(&mut self.near);
+        near.clear();
+        self.near_edges.clear();
+        let corner = |n: &u32| to_real(&self.local[surface.index_of_node[*n as usize] as usize]);
+        for (t, triangle) in (0..).zip(&surface.triangles) {
+            if !self.are_beyond(surface, triangle) {
+                near.push((t, Aabb::from_points(triangle.iter().map(corner))));
+                let own = |e: &&u32| surface.edge_triangles[**e as usize][0] == t;
+                self.near_edges.extend(surface.triangle_edges[t as usize].iter().filter(own));
+            }
+        }
+        self.near_edges.extend(&surface.segments);
+        self.near_edges.sort_unstable();
+        self.near = near;
+    }
+
+    /// The rim that crosses an edge.
+    pub(super) fn on_edge(&self, edge: u32) -> Option<&SurfacePoint> {
+        let place = self.edges.binary_search_by_key(&edge, |(e, _)| *e);
+        place.ok().map(|k| &self.edges[k].1)
+    }
+
     fn detect_nodes(
         &mut self,
         scene: &PairScene<'_>,
@@ -120,9 +174,12 @@ impl Detector {
     ) {
         let surface = &scene.model.surface;
         let nodes = &surface.nodes;
-        self.nodes.clear();
-        self.nodes.resize(nodes.len(), None);
+        // Those of the obstacle before.
+        self.found.drain(..).for_each(|s| self.nodes[s as usize] = None);
         for s in 0..nodes.len() {
+            if self.beyond[s] != 0 {
+                continue;
+            }
             let p = self.local[s];
             let reach = self.reach[s] + scene.motion;
             if !near(&scene.extent, &p, reach) {
@@ -142,6 +199,7 @@ impl Detector {
                 to_local(&self.normals[s])
             };
             self.nodes[s] = surface_point(scene.obstacle, &p, &outward, &scene.scales);
+            self.found.push(s as u32);
             if let Some(found) = self.nodes[s].filter(|f| f.gap < reach) {
                 constraints.push(scene.constraint(
                     [nodes[s], 0, 0],
@@ -156,8 +214,9 @@ impl Detector {
     fn detect_rims(&mut self, scene: &PairScene<'_>, constraints: &mut Vec<Constraint>) {
         let surface = &scene.model.surface;
         self.edges.clear();
-        self.edges.resize(surface.edges.len(), None);
-        for (e, edge) in surface.edges.iter().enumerate() {
+        for k in 0..self.near_edges.len() {
+            let e = self.near_edges[k] as usize;
+            let edge = &surface.edges[e];
             let ends = edge.map(|n| surface.index_of_node[n as usize] as usize);
             let reach = self.reach[ends[0]].max(self.reach[ends[1]]) + scene.motion;
             let points = ends.map(|s| self.local[s]);
@@ -187,24 +246,27 @@ impl Detector {
                     &found,
                     (Feature::Edge(e as u32), 0),
                 ));
-                self.edges[e] = Some(found);
+                self.edges.push((e as u32, found));
             }
         }
     }
 
     fn detect_corners(&mut self, scene: &PairScene<'_>, constraints: &mut Vec<Constraint>) {
         let surface = &scene.model.surface;
-        let reach = self.reach.iter().fold(0.0, |a: f64, b| a.max(*b)) + scene.motion;
-        let body = Aabb::from_points(self.local.iter().map(to_real)).loosened(reach as f32);
-        corners_in(scene.obstacle, &body, &mut self.corners);
+        let reach = self.farthest_reach(scene);
+        let boxes = self.near.iter().map(|(_, aabb)| *aabb);
+        let near = boxes.reduce(|a, b| a.merged(&b)).unwrap_or_else(Aabb::new_invalid);
+        corners_in(scene.obstacle, &near.loosened(reach as f32), &mut self.corners);
         self.standing.clear();
         for (number, corner) in &self.corners {
             let at = to_real(corner);
             let mut best: Option<(usize, [f64; 3], SurfacePoint)> = None;
-            for (t, triangle) in surface.triangles.iter().enumerate() {
-                if !self.boxes[t].loosened(reach as f32).contains_local_point(at) {
+            for (t, aabb) in &self.near {
+                if !aabb.loosened(reach as f32).contains_local_point(at) {
                     continue;
                 }
+                let t = *t as usize;
+                let triangle = &surface.triangles[t];
                 let corners = triangle.map(|n| self.local[surface.index_of_node[n as usize] as usize]);
                 let turned = t >= surface.closed && self.looks_away(scene, triangle, &corners);
                 let [a, b, c] = corners;
@@ -234,7 +296,7 @@ impl Detector {
     }
 
     /// The body's normal at an edge, in the obstacle's frame.
-    fn edge_normal(&self, surface: &crate::mesh::Surface, edge: usize) -> Vec3 {
+    fn edge_normal(&self, surface: &Surface, edge: usize) -> Vec3 {
         let normal = |&t: &u32| {
             let triangle = surface.triangles[t as usize];
             let [a, b, c] = triangle.map(|n| self.local[surface.index_of_node[n as usize] as usize]);

@@ -68,11 +68,7 @@ pub(super) fn crossing(
     };
     let sign = if towards.dot(&normal) < 0.0 { -1.0 } else { 1.0 };
     let (normal, height) = (normal * sign, height * sign);
-    let within = height < reach && height > -deepest;
-    if !within
-        || !(thin[0] || looks_along(a, ea, &outward_a, &-normal, tolerance.askew))
-        || !(thin[1] || looks_along(b, eb, &outward_b, &normal, tolerance.askew))
-    {
+    if !(height < reach && height > -deepest) {
         return None;
     }
     let way = mean_motion(a, [i, j]) - mean_motion(b, [k, l]);
@@ -83,8 +79,13 @@ pub(super) fn crossing(
     let s = w.cross(&v).dot(&across) / squared;
     let t = w.cross(&u).dot(&across) / squared;
     let inside = |t: f64| t > -tolerance.beside && t < 1.0 + tolerance.beside;
+    // Most edges pass one another beyond their ends: what takes longer comes last.
+    let crosses = inside(s)
+        && inside(t)
+        && (thin[0] || looks_along(a, ea, &outward_a, &-normal, tolerance.askew))
+        && (thin[1] || looks_along(b, eb, &outward_b, &normal, tolerance.askew));
     let gap = height - skin(a, [i, j], s) - skin(b, [k, l], t);
-    (inside(s) && inside(t)).then_some(Crossing { places: [s, t], normal, gap, closing })
+    crosses.then_some(Crossing { places: [s, t], normal, gap, closing })
 }
 
 /// How far the farther of two nodes may come \[m\].

@@ -9,6 +9,7 @@ mod obstacle;
 
 mod constraint;
 
+mod box_tree;
 mod candidates;
 mod surface_point;
 
@@ -37,6 +38,7 @@ mod tunnelling_stop;
 
 mod queries;
 
+pub(crate) use box_tree::BoxTree;
 pub(crate) use candidates::Candidates;
 pub(crate) use constraint::{Constraint, Endpoint, Law};
 pub(crate) use detection::{Detector, STATIC_MARGIN};

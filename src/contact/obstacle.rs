@@ -48,9 +48,10 @@ impl Obstacle {
         self.corners.as_ref().is_none_or(|corners| corners.binary_search(&vertex).is_ok())
     }
 
-    /// Displacement over the step \[m\] of the obstacle's material point that is at `p` at its start.
-    pub fn displacement(&self, p: &Vec3) -> Vec3 {
-        self.end.transform(&self.start.inverse_transform(p)) - p
+    /// Displacement over the step \[m\] of the obstacle's material point that is at `p` at its start, at `local` in its
+    /// own frame.
+    pub fn displacement(&self, p: &Vec3, local: &Vec3) -> Vec3 {
+        self.end.transform(local) - p
     }
 
     /// Displacement over the step \[m\] of the corner of the obstacle's box that goes farthest.

@@ -34,18 +34,25 @@ pub(super) struct PairScene<'a> {
 }
 
 impl<'a> PairScene<'a> {
-    /// Of a body whose surface nodes are at `x`.
-    pub fn new(pair: &'a Pair, obstacle: &'a Obstacle, model: &'a DeformableModel, x: &[Vec3]) -> Self {
+    /// Of a body whose surface nodes are at `x`, and at `local` in the obstacle's frame.
+    pub fn new(
+        pair: &'a Pair,
+        obstacle: &'a Obstacle,
+        model: &'a DeformableModel,
+        x: &[Vec3],
+        local: &[Vec3],
+    ) -> Self {
         let surface = &model.surface;
         let moves = obstacle.start != obstacle.end;
-        let motion = |n: &u32| obstacle.displacement(&x[*n as usize]).norm();
+        let motion = |(n, p): (&u32, &Vec3)| obstacle.displacement(&x[*n as usize], p).norm_squared();
+        let motions = surface.nodes.iter().zip(local).map(motion);
         Self {
             pair,
             obstacle,
             model,
             extent: obstacle.shape.compute_local_aabb(),
             scales: Scales { band: BAND * model.size, shift: SHIFT * surface.mean_edge },
-            motion: if moves { surface.nodes.iter().map(motion).fold(0.0, f64::max) } else { 0.0 },
+            motion: if moves { motions.fold(0.0, f64::max).sqrt() } else { 0.0 },
         }
     }
 

@@ -33,8 +33,9 @@ pub(crate) struct SoftDetector {
     /// Surface nodes of one body and triangles of the other.
     on_triangles: [Vec<(u32, u32)>; 2],
     edges: Vec<(u32, u32)>,
-    /// The contacts that carried in the last step, ascending by their names, with their normals.
-    carried: Vec<(ConstraintKey, Vec3)>,
+    /// The contacts that carried in the last step, ascending by what of the second and the first body they are of and
+    /// their kind, with their normals.
+    carried: Vec<((u32, u32, SoftPairKind), Vec3)>,
     touches: Vec<Touch>,
     /// When each constraint closes, as part of the step, and how much it closes in all of it \[m\].
     closings: Vec<Closing>,
@@ -54,9 +55,10 @@ impl SoftDetector {
     ) {
         let [a, b] = surfaces;
         self.carried.clear();
-        let between = |m: &&ConstraintMemory| matches!(m.key, ConstraintKey::SoftPair(c) if c.other == b.key);
-        let carried = memory.iter().filter(between).filter(|m| m.force != Vec3::zeros());
-        self.carried.extend(carried.map(|m| (m.key, m.geometry.frame[0])));
+        self.carried.extend(memory.iter().filter(|m| m.force != Vec3::zeros()).filter_map(|m| match m.key {
+            ConstraintKey::SoftPair(c) if c.other == b.key => Some((name(&c), m.geometry.frame[0])),
+            _ => None,
+        }));
         let itself = a.key == b.key;
         self.collect(surfaces, itself);
         for (pushed, surface) in self.pushed.iter_mut().zip(surfaces) {
@@ -132,9 +134,9 @@ impl SoftDetector {
                 self.edges.extend(others.map(|&eb| (ea, eb)).filter(|(ea, eb)| !itself || ea < eb));
             }
         }
-        for list in [of_a, of_b, &mut self.edges] {
-            list.sort_unstable();
-        }
+        // Edges may come in any order: each pair of them is looked at alone.
+        of_a.sort_unstable();
+        of_b.sort_unstable();
     }
 
     /// Nodes of the body on `side` on triangles of the other.
@@ -153,9 +155,7 @@ impl SoftDetector {
             let node = own.model.surface.nodes[s];
             let kind = [SoftPairKind::FirstNode, SoftPairKind::SecondNode][side];
             let other_key = surfaces[1].key;
-            let key = |t: u32| {
-                ConstraintKey::SoftPair(SoftPairContact { other: other_key, second: t, first: node, kind })
-            };
+            let key = |t: u32| SoftPairContact { other: other_key, second: t, first: node, kind };
             self.touches_of_node(surfaces, side, near, &key, &mut touches);
             let Some(last) = touches.last() else { continue };
             self.pushed[side][s] = Some(last.normal);
@@ -167,7 +167,8 @@ impl SoftDetector {
                     0 => ([own_endpoint, other_endpoint], touch.normal),
                     _ => ([other_endpoint, own_endpoint], -touch.normal),
                 };
-                constraints.push(pair.constraint(endpoints, normal, touch.gap, key(touch.triangle as u32)));
+                let key = ConstraintKey::SoftPair(key(touch.triangle as u32));
+                constraints.push(pair.constraint(endpoints, normal, touch.gap, key));
                 self.closings.push(touch.closing);
             }
         }
@@ -182,7 +183,7 @@ impl SoftDetector {
         surfaces: [&SoftSurface<'_>; 2],
         side: usize,
         near: &[(u32, u32)],
-        key: &impl Fn(u32) -> ConstraintKey,
+        key: &impl Fn(u32) -> SoftPairContact,
         touches: &mut Vec<Touch>,
     ) {
         let (own, other) = (surfaces[side], surfaces[1 - side]);
@@ -214,8 +215,8 @@ impl SoftDetector {
     }
 
     /// The normal of a contact that carried in the last step.
-    fn last_normal(&self, key: &ConstraintKey) -> Option<Vec3> {
-        let place = self.carried.binary_search_by(|(name, _)| name.cmp(key));
+    fn last_normal(&self, contact: &SoftPairContact) -> Option<Vec3> {
+        let place = self.carried.binary_search_by_key(&name(contact), |(name, _)| *name);
         place.ok().map(|k| self.carried[k].1)
     }
 
@@ -237,7 +238,7 @@ impl SoftDetector {
                 continue;
             }
             let kind = SoftPairKind::Edges;
-            let key = ConstraintKey::SoftPair(SoftPairContact { other: b.key, second: eb, first: ea, kind });
+            let key = SoftPairContact { other: b.key, second: eb, first: ea, kind };
             let last = self.last_normal(&key);
             let carried = last.is_some();
             let tolerance = if carried { CARRYING_EDGES } else { NEW_EDGES };
@@ -261,11 +262,16 @@ impl SoftDetector {
                 [soft(0, a.body), soft(1, b.body)],
                 crossing.normal,
                 crossing.gap,
-                key,
+                ConstraintKey::SoftPair(key),
             ));
             self.closings.push(crossing.closing);
         }
     }
+}
+
+/// What of two given bodies a contact is of, ascending as [`ConstraintKey`] is.
+fn name(contact: &SoftPairContact) -> (u32, u32, SoftPairKind) {
+    (contact.second, contact.first, contact.kind)
 }
 
 /// Whether a surface node and a triangle of the same body are too near in the mesh to touch.
@@ -311,6 +317,7 @@ mod tests {
             };
             let mut detector = SoftDetector::default();
             detector.collect([&surface(0), &surface(1)], false);
+            detector.edges.sort_unstable();
             let at = |k: usize, n: u32| to_real(&x[k][n as usize]);
             let mesh = &model.surface;
             // Two boxes with the margin around each meet within √3 of twice the margin along their

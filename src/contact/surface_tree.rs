@@ -11,18 +11,30 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 pub(crate) struct SurfaceTree {
     tree: Bvh,
     boxes: Vec<Aabb>,
+    /// Per surface node, around its way.
+    ways: Vec<Aabb>,
 }
 
 /// Rounding of `f32` coordinates, relative to them.
-const ROUNDING: f32 = 2.5e-7;
+pub(super) const ROUNDING: f32 = 2.5e-7;
 
 impl SurfaceTree {
     /// Refits to the facets on their way from `x` to `target`, with `margin` \[m\] around them.
     pub fn update(&mut self, model: &DeformableModel, x: &[Vec3], target: &[Vec3], margin: f64) {
+        let surface = &model.surface;
+        let way = |&n: &u32| {
+            let [from, to] = [to_real(&x[n as usize]), to_real(&target[n as usize])];
+            Aabb::new(from.min(to), from.max(to))
+        };
+        self.ways.clear();
+        self.ways.extend(surface.nodes.iter().map(way));
         self.boxes.clear();
-        for facet in 0..model.surface.facet_count() {
-            let way = |&n: &u32| [to_real(&x[n as usize]), to_real(&target[n as usize])];
-            let swept = Aabb::from_points(model.surface.facet_nodes(facet).iter().flat_map(way));
+        for facet in 0..surface.facet_count() {
+            let ways = surface
+                .facet_nodes(facet)
+                .iter()
+                .map(|&n| self.ways[surface.index_of_node[n as usize] as usize]);
+            let swept = ways.reduce(|a, b| a.merged(&b)).unwrap_or_else(Aabb::new_invalid);
             let rounding = ROUNDING * swept.mins.abs().max(swept.maxs.abs()).max_element();
             self.boxes.push(swept.loosened(margin as f32 + rounding));
         }
@@ -34,6 +46,11 @@ impl SurfaceTree {
             self.tree.insert_or_update_partially(*aabb, number, 0.0);
         }
         self.tree.refit_without_opt();
+    }
+
+    /// Facets whose boxes meet `aabb`, in no order.
+    pub fn near<'a>(&'a self, aabb: &'a Aabb) -> impl Iterator<Item = u32> + 'a {
+        self.tree.intersect_aabb(aabb).filter(|&facet| self.boxes[facet as usize].intersects(aabb))
     }
 
     /// Pairs of facets, of this surface and of `other`, whose boxes meet. In no order; but which ones does not

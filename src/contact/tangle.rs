@@ -7,6 +7,7 @@ use super::soft_surface::{SoftSurface, near_in_mesh};
 use crate::body::{ConstraintKey, SoftPairContact, SoftPairKind};
 use crate::math::{Vec3, to_real};
 use crate::mesh::tetrahedron_holds;
+use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Pose;
 use parry3d::query::{PointQuery, intersection_test};
 use parry3d::shape::Triangle;
@@ -171,13 +172,34 @@ fn go_through(a: &SoftSurface<'_>, ta: u32, b: &SoftSurface<'_>, tb: u32) -> boo
 /// Whether a surface node of one body is deep in the other.
 fn is_deep(own: &SoftSurface<'_>, other: &SoftSurface<'_>) -> bool {
     let depth = DEEP * other.model.surface.mean_edge;
-    let holds = |tet: &[u32; 4], p: &Vec3| tetrahedron_holds(&tet.map(|n| other.x[n as usize]), p);
     // What is that deep is as far inside of the other's box: next to nothing of bodies that rest on one another.
     let low = other.x.iter().fold(other.x[0], |a, b| a.inf(b)).add_scalar(depth);
     let high = other.x.iter().fold(other.x[0], |a, b| a.sup(b)).add_scalar(-depth);
     let nodes = own.model.surface.nodes.iter().map(|&n| own.x[n as usize]);
-    nodes.filter(|p| (0..3).all(|k| p[k] > low[k] && p[k] < high[k])).any(|p| {
-        let inside = other.model.tetrahedra.iter().any(|tet| holds(tet, &p));
-        inside && (0..other.model.surface.triangles.len() as u32).all(|t| distance(other, t, &p) > depth)
+    let mut nodes = nodes.filter(|p| (0..3).all(|k| p[k] > low[k] && p[k] < high[k]));
+    // Few are far from the surface: they alone are worth a look at all elements.
+    nodes.any(|p| is_far_from_surface(other, &p, depth) && is_inside(other, &p))
+}
+
+/// Whether no triangle is within `depth` \[m\] of a point.
+fn is_far_from_surface(s: &SoftSurface<'_>, p: &Vec3, depth: f64) -> bool {
+    // Boxes of triangles have a margin, which is more than rounding takes.
+    let at = to_real(p);
+    let around = Aabb::new(at, at).loosened(depth as f32);
+    s.tree.near(&around).all(|t| distance(s, t, p) > depth)
+}
+
+/// Whether a point is in one of the elements.
+fn is_inside(s: &SoftSurface<'_>, p: &Vec3) -> bool {
+    // Beyond all corners of an element by more than rounding, a point is not in it.
+    let slack = CLEARLY * s.model.surface.mean_edge;
+    let is_beside = |corners: &[Vec3; 4], k: usize| {
+        let least = corners.iter().fold(f64::INFINITY, |least, c| least.min(c[k]));
+        let most = corners.iter().fold(f64::NEG_INFINITY, |most, c| most.max(c[k]));
+        p[k] < least - slack || p[k] > most + slack
+    };
+    s.model.tetrahedra.iter().any(|tet| {
+        let corners = tet.map(|n| s.x[n as usize]);
+        !(0..3).any(|k| is_beside(&corners, k)) && tetrahedron_holds(&corners, p)
     })
 }

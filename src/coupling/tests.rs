@@ -135,7 +135,7 @@ proptest! {
         let end = Pose64::from_real(physics.bodies[body].position());
         for corner in [Vec3::zeros(), Vec3::new(0.1, 0.2, 0.3), Vec3::new(-0.1, 0.2, -0.3)] {
             let p = start.compose(&offset).transform(&corner);
-            let moved = obstacle.displacement(&p);
+            let moved = obstacle.displacement(&p, &obstacle.start.inverse_transform(&p));
             let by_rapier = end.compose(&offset).transform(&corner) - p;
             // Places of up to 2 m in f32; and rapier turns in substeps.
             prop_assert!((moved - by_rapier).norm() < 2.0 * SINGLE, "{} {}", moved, by_rapier);

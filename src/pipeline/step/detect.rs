@@ -9,6 +9,7 @@ use crate::coupling::{
     StepContext, SteppedBodies, WalkContext, attached_nodes, attachment_constraints, prescribed_nodes,
 };
 use crate::threads::for_each;
+use std::collections::HashMap;
 
 impl StepScratch {
     pub(super) fn read_obstacles(&mut self, context: &StepContext<'_>) {
@@ -28,6 +29,7 @@ impl StepScratch {
         context: &StepContext<'_>,
         recovery: f64,
     ) {
+        self.places.clear();
         for (handle, body) in deformables.iter_mut() {
             if !body.is_enabled() {
                 continue;
@@ -56,21 +58,30 @@ impl StepScratch {
         let work = self.idle.remove(&handle);
         let mut work = work.unwrap_or_else(|| BodyWork::new(handle));
         work.index = self.works.len();
+        self.places.insert(handle, work.index);
         self.works.push(work);
     }
 
     /// Tells the bodies from place `first` on what attachments prescribe, and where they go without contact.
     fn predict_from(&mut self, first: usize, deformables: &DeformableBodySet, context: &StepContext<'_>) {
-        for work in &mut self.works[first..] {
-            let own = self.prescribed.iter().filter(|(body, _)| *body == work.handle);
+        let new = &mut self.works[first..];
+        for work in new.iter_mut() {
             work.prescribed.clear();
-            work.prescribed.extend(own.map(|(_, node)| *node));
-            let own = self.attached.iter().filter(|(body, ..)| *body == work.handle);
             work.attached.clear();
-            work.attached.extend(own.map(|(_, proxy, node)| (*proxy, *node)));
-            work.attached.sort_unstable();
         }
-        for_each(&mut self.works[first..], |work| {
+        let place = |body: &DeformableBodyHandle| self.places.get(body)?.checked_sub(first);
+        for (body, node) in &self.prescribed {
+            if let Some(place) = place(body) {
+                new[place].prescribed.push(*node);
+            }
+        }
+        for (body, proxy, node) in &self.attached {
+            if let Some(place) = place(body) {
+                new[place].attached.push((*proxy, *node));
+            }
+        }
+        for_each(new, |work| {
+            work.attached.sort_unstable();
             work.predict(&deformables[work.handle], context.h, &context.gravity);
         });
     }
@@ -106,7 +117,7 @@ impl StepScratch {
             self.sleeping.wake_together(deformables);
             let awake = deformables.iter().filter(|(_, body)| body.is_enabled() && !body.is_sleeping());
             for (handle, _) in awake {
-                if self.works[..first].iter().all(|work| work.handle != handle) {
+                if !self.places.contains_key(&handle) {
                     self.activate(handle);
                     self.counters.sleeping -= 1;
                 }
@@ -128,7 +139,7 @@ impl StepScratch {
     /// Adds the constraints of the attachments.
     pub(super) fn attach(&mut self, deformables: &DeformableBodySet, context: &StepContext<'_>) {
         self.works.iter_mut().for_each(|work| work.linked_nodes.clear());
-        let stepped = Stepped(&self.works);
+        let stepped = Stepped { works: &self.works, places: &self.places };
         attachment_constraints(deformables, &mut self.scene, context, &stepped, &mut self.linking);
         // Between nodes that are prescribed and what does not yield there is nothing to solve for.
         let (works, proxies) = (&self.works, &self.scene.proxies);
@@ -160,14 +171,17 @@ impl StepScratch {
 }
 
 /// The step's list, as attachments ask it.
-struct Stepped<'a>(&'a [BodyWork]);
+struct Stepped<'a> {
+    works: &'a [BodyWork],
+    places: &'a HashMap<DeformableBodyHandle, usize>,
+}
 
 impl SteppedBodies for Stepped<'_> {
     fn place_of(&self, body: DeformableBodyHandle) -> Option<usize> {
-        self.0.iter().position(|work| work.handle == body)
+        self.places.get(&body).copied()
     }
 
     fn is_prescribed(&self, place: usize, node: u32, by: DeformableAttachmentHandle) -> bool {
-        self.0[place].is_prescribed(node, by)
+        self.works[place].is_prescribed(node, by)
     }
 }

@@ -22,6 +22,8 @@ pub(in crate::pipeline) struct StepScratch {
     pub(super) idle: HashMap<DeformableBodyHandle, BodyWork>,
     /// Of the bodies that are stepped.
     pub(super) works: Vec<BodyWork>,
+    /// Their places in that list, up to the solve.
+    pub(super) places: HashMap<DeformableBodyHandle, usize>,
     pub(in crate::pipeline) factors: FactorCache,
     pub(super) islands: Vec<IslandWork>,
     pub(super) grouping: Grouping,

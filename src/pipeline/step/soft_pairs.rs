@@ -2,7 +2,7 @@
 
 use super::work::BodyWork;
 use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet};
-use crate::contact::{Constraint, Endpoint, SoftDetector, SoftPair};
+use crate::contact::{BoxTree, Constraint, Endpoint, SoftDetector, SoftPair};
 use crate::coupling::combined_between;
 use crate::threads::for_each;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
@@ -11,10 +11,13 @@ use std::collections::HashMap;
 /// Pairs of bodies and memory for finding them.
 #[derive(Default)]
 pub(super) struct SoftPairDetection {
-    /// Boxes of the bodies with their places: those that are stepped first, then those that sleep.
-    boxes: Vec<(Aabb, usize)>,
-    /// The one along which they are swept: the longest of the box around them all.
-    axis: usize,
+    /// Boxes of the bodies by their places: those that are stepped first, then those that sleep.
+    boxes: Vec<Aabb>,
+    tree: BoxTree,
+    /// Pairs of places whose boxes come near one another, kept while the tree is.
+    near: Vec<[u32; 2]>,
+    /// Places of the pairs of this step.
+    ends: Vec<[usize; 2]>,
     /// Bodies that sleep beside others, as obstacles until they are woken.
     dormant: Vec<BodyWork>,
     /// Those of the last step, for their memory.
@@ -107,22 +110,20 @@ impl SoftPairDetection {
     /// Boxes of all bodies that are stepped, and of those that sleep beside them.
     fn update_boxes(&mut self, works: &[BodyWork], deformables: &DeformableBodySet) {
         self.boxes.clear();
-        self.boxes.extend(works.iter().enumerate().map(|(place, work)| (work.extent, place)));
+        self.boxes.extend(works.iter().map(|work| work.extent));
         self.memory.extend(self.dormant.drain(..).map(|work| (work.handle, work)));
-        let Some(all) = self.boxes.iter().map(|(aabb, _)| *aabb).reduce(|a, b| a.merged(&b)) else { return };
-        self.axis = all.extents().max_position();
+        let Some(all) = self.boxes.iter().copied().reduce(|a, b| a.merged(&b)) else { return };
         for (handle, body) in deformables.iter().filter(|(_, b)| b.is_enabled() && b.is_sleeping()) {
             if body.aabb().loosened(BodyWork::margin(body)).intersects(&all) {
-                let mut work = self.memory.remove(&handle).unwrap_or_else(|| BodyWork::new(handle));
-                work.survey(body);
-                self.boxes.push((work.extent, works.len() + self.dormant.len()));
-                self.dormant.push(work);
+                self.dormant.push(self.memory.remove(&handle).unwrap_or_else(|| BodyWork::new(handle)));
             }
         }
+        for_each(&mut self.dormant, |work| work.survey(&deformables[work.handle]));
+        self.boxes.extend(self.dormant.iter().map(|work| work.extent));
         self.memory.clear();
     }
 
-    /// Pairs of bodies whose boxes meet, by a sweep along one axis.
+    /// Pairs of bodies whose boxes meet, ascending by their handles.
     fn find_pairs(&mut self, works: &[BodyWork], deformables: &DeformableBodySet) {
         self.attached.clear();
         for (_, attachment) in deformables.attachments().filter(|(_, a)| !a.is_broken()) {
@@ -131,44 +132,40 @@ impl SoftPairDetection {
             }
         }
         self.attached.sort_unstable();
-        let axis = self.axis;
-        self.boxes.sort_unstable_by(|a, b| a.0.mins[axis].total_cmp(&b.0.mins[axis]).then(a.1.cmp(&b.1)));
+        if self.tree.update(&self.boxes) {
+            self.tree.list_pairs(&mut self.near);
+        }
         let dormant = &self.dormant;
         let handle = |place: usize| match works.get(place) {
             Some(work) => work.handle,
             None => dormant[place - works.len()].handle,
         };
-        self.count = 0;
-        let (pairs, count) = (&mut self.pairs, &mut self.count);
-        let mut add = |ends: [usize; 2], pair: SoftPair| {
-            if *count == pairs.len() {
-                pairs.push(PairDetection::default());
+        self.ends.clear();
+        let touch_themselves = |place: &usize| deformables[works[*place].handle].self_contact();
+        self.ends.extend((0..works.len()).filter(touch_themselves).map(|place| [place; 2]));
+        for places in &self.near {
+            let mut ends = places.map(|place| place as usize);
+            // Those that sleep come last.
+            if ends[0] >= works.len() || !self.boxes[ends[0]].intersects(&self.boxes[ends[1]]) {
+                continue;
             }
-            (pairs[*count].ends, pairs[*count].pair) = (ends, pair);
-            *count += 1;
-        };
-        for (i, (aabb, place)) in self.boxes.iter().enumerate() {
-            let own = &deformables[handle(*place)];
-            if own.self_contact() && *place < works.len() {
-                add([*place; 2], pair_of(own, own));
-            }
-            let near =
-                self.boxes[i + 1..].iter().take_while(|(other, _)| other.mins[axis] <= aabb.maxs[axis]);
-            for (_, other) in near.filter(|(other, _)| other.intersects(aabb)) {
-                let mut ends = [*place, *other];
-                if ends.iter().all(|end| *end >= works.len()) {
-                    continue;
-                }
-                ends.sort_unstable_by_key(|end| handle(*end));
-                let handles = ends.map(handle);
-                let [a, b] = handles.map(|h| &deformables[h]);
-                let collide = a.collision_groups().test(b.collision_groups());
-                if collide && self.attached.binary_search(&handles).is_err() {
-                    add(ends, pair_of(a, b));
-                }
+            ends.sort_unstable_by_key(|end| handle(*end));
+            let handles = ends.map(handle);
+            let [a, b] = handles.map(|h| &deformables[h]);
+            let collide = a.collision_groups().test(b.collision_groups());
+            if collide && self.attached.binary_search(&handles).is_err() {
+                self.ends.push(ends);
             }
         }
-        self.pairs[..self.count].sort_unstable_by_key(|pair| pair.ends.map(handle));
+        self.ends.sort_unstable_by_key(|ends| ends.map(handle));
+        self.count = self.ends.len();
+        if self.pairs.len() < self.count {
+            self.pairs.resize_with(self.count, PairDetection::default);
+        }
+        for (pair, ends) in self.pairs.iter_mut().zip(&self.ends) {
+            let [a, b] = ends.map(|end| &deformables[handle(end)]);
+            (pair.ends, pair.pair) = (*ends, pair_of(a, b));
+        }
     }
 }
 
