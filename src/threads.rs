@@ -19,6 +19,46 @@ pub(crate) fn for_each<T: Send>(items: &mut [T], f: impl Fn(&mut T) + Sync + Sen
     items.iter_mut().for_each(f);
 }
 
+/// Calls `f` with the place and an item; on several threads if the items are `large`.
+pub(crate) fn for_each_item<T: Send>(items: &mut [T], large: bool, f: impl Fn(usize, &mut T) + Sync + Send) {
+    // Companions without a size take no memory.
+    let mut none = vec![(); items.len()];
+    for_each_pair(items, &mut none, large, |place, item, ()| f(place, item));
+}
+
+/// Calls `f` with the place, an item and its companion; on several threads if the items are `large`.
+#[cfg(feature = "parallel")]
+pub(crate) fn for_each_pair<A: Send, B: Send>(
+    items: &mut [A],
+    companions: &mut [B],
+    large: bool,
+    f: impl Fn(usize, &mut A, &mut B) + Sync + Send,
+) {
+    use rayon::prelude::*;
+    if large && items.len() > 1 {
+        let pairs = items.par_iter_mut().zip(companions).enumerate();
+        pairs.for_each(|(place, (item, companion))| f(place, item, companion));
+    } else {
+        each_pair(items, companions, f);
+    }
+}
+
+/// Calls `f` with the place, an item and its companion.
+#[cfg(not(feature = "parallel"))]
+pub(crate) fn for_each_pair<A: Send, B: Send>(
+    items: &mut [A],
+    companions: &mut [B],
+    _large: bool,
+    f: impl Fn(usize, &mut A, &mut B) + Sync + Send,
+) {
+    each_pair(items, companions, f);
+}
+
+fn each_pair<A, B>(items: &mut [A], companions: &mut [B], f: impl Fn(usize, &mut A, &mut B)) {
+    let pairs = items.iter_mut().zip(companions).enumerate();
+    pairs.for_each(|(place, (item, companion))| f(place, item, companion));
+}
+
 /// Calls `f` with the place and the values of every part of `values`: part k goes from `ends[k]` to `ends[k + 1]`.
 #[cfg(feature = "parallel")]
 pub(crate) fn for_each_part<T: Send>(

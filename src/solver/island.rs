@@ -10,9 +10,10 @@ use super::counters::SolveCounters;
 use crate::body::{Acceleration, Solver};
 use crate::profiler::timed;
 use crate::solver::acceleration::Accelerator;
-use crate::solver::body_step::{BodyProblem, Factors, NewtonFactors};
+use crate::solver::body_step::{BodyProblem, Factors, NewtonFactors, are_large};
 use crate::solver::cone::ConeTolerance;
 use crate::solver::constraints::{Change, ContactSystem, ContactWork, Slack, SolveContext};
+use crate::threads::for_each_pair;
 
 /// Bodies whose steps depend on one another.
 #[derive(Default)]
@@ -21,6 +22,10 @@ pub(crate) struct Island {
     pub contacts: ContactSystem,
     pub report: IslandReport,
     accelerations: Vec<Accelerator>,
+    /// What became of the bodies' trial positions.
+    trials: Vec<Trial>,
+    /// Its bodies are worth several threads.
+    is_large: bool,
     newton_factors: NewtonFactors,
 }
 
@@ -30,6 +35,14 @@ pub(crate) struct IslandReport {
     pub iterations: usize,
     pub contacts: ContactWork,
     pub counters: SolveCounters,
+}
+
+/// What became of a trial position.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Trial {
+    /// It was bent to a true rotation.
+    is_bent: bool,
+    descends: bool,
 }
 
 /// What became of an iteration.
@@ -61,12 +74,14 @@ impl Island {
     pub fn solve(&mut self, context: &SolveContext<'_>) {
         self.report = IslandReport::default();
         self.newton_factors.begin(self.bodies.len());
-        for body in &mut self.bodies {
-            body.choose_initial_guess(context.factors.get(body.factor));
-        }
-        self.contacts.begin(&mut self.bodies, context);
+        self.is_large = are_large(&self.bodies);
+        self.trials.resize(self.bodies.len(), Trial::default());
         self.accelerations.resize_with(self.bodies.len(), Accelerator::default);
-        self.accelerations.iter_mut().for_each(Accelerator::clear);
+        for_each_pair(&mut self.bodies, &mut self.accelerations, self.is_large, |_, body, acceleration| {
+            body.choose_initial_guess(context.factors.get(body.factor));
+            acceleration.clear();
+        });
+        self.contacts.begin(&mut self.bodies, context);
         let iterations = self.bodies.iter().map(|b| b.settings.max_iterations).max().unwrap_or(0);
         for _ in 0..iterations {
             self.report.iterations += 1;
@@ -168,27 +183,23 @@ impl Island {
         loop {
             outcome = Outcome::Descended;
             let own = Factors { cache: context.factors, newton: &self.newton_factors };
-            let bodies = self.bodies.iter_mut().zip(&mut self.accelerations);
-            for (index, (body, acceleration)) in bodies.enumerate() {
-                let kind = acceleration_of(body, &self.contacts);
-                acceleration.step(kind, body, own.of(index, body));
-            }
-            if !self.contacts.is_empty() {
+            let contacts = &self.contacts;
+            let accelerations = &mut self.accelerations;
+            for_each_pair(&mut self.bodies, accelerations, self.is_large, |index, body, acceleration| {
+                acceleration.step(acceleration_of(body, contacts), body, own.of(index, body));
+            });
+            let touches = !self.contacts.is_empty();
+            if touches {
                 self.solve_contacts(context);
-                for body in &mut self.bodies {
-                    if body.bend_step_to_rotation() {
-                        outcome = Outcome::Turned;
-                    }
-                }
+            }
+            if self.evaluate_trials(touches) {
+                outcome = Outcome::Turned;
             }
             let mut descends = true;
             let mut damped_more = false;
             let mut stalled = 0;
-            for (body, acceleration) in self.bodies.iter_mut().zip(&mut self.accelerations) {
-                body.evaluate_trial();
-                if body.trial_descends() {
-                    continue;
-                }
+            let bodies = self.bodies.iter_mut().zip(&mut self.accelerations).zip(&self.trials);
+            for ((body, acceleration), _) in bodies.filter(|(_, trial)| !trial.descends) {
                 // An update that does not descend is forgotten before the preconditioner is doubted. At the end
                 // of the scale the body stays where it is: its step would have been a thousandth.
                 if !acceleration.is_empty() {
@@ -214,11 +225,22 @@ impl Island {
                 self.contacts.outdate(Change::Factors);
             }
         }
-        for (body, acceleration) in self.bodies.iter_mut().zip(&mut self.accelerations) {
-            acceleration.learn(acceleration_of(body, &self.contacts), body);
+        let contacts = &self.contacts;
+        for_each_pair(&mut self.bodies, &mut self.accelerations, self.is_large, |_, body, acceleration| {
+            acceleration.learn(acceleration_of(body, contacts), body);
             body.accept_trial();
-        }
+        });
         outcome
+    }
+
+    /// Evaluates the trial positions; true if one of them was bent to a true rotation.
+    fn evaluate_trials(&mut self, touches: bool) -> bool {
+        for_each_pair(&mut self.bodies, &mut self.trials, self.is_large, |_, body, trial| {
+            trial.is_bent = touches && body.bend_step_to_rotation();
+            body.evaluate_trial();
+            trial.descends = body.trial_descends();
+        });
+        self.trials.iter().any(|trial| trial.is_bent)
     }
 
     /// Solves the contacts at the trial positions and moves the bodies to what comes of it; again for those

@@ -9,4 +9,5 @@ mod newton_factors;
 mod rigid_fallback;
 
 pub(crate) use newton_factors::{Factors, NewtonFactors};
+pub(in crate::solver) use problem::are_large;
 pub(crate) use problem::{BodyProblem, SECOND_ORDER};

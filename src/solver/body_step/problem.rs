@@ -18,6 +18,14 @@ use std::sync::Arc;
 /// Rotation of an iteration \[rad\] beyond which it is bent to a true one: below, the stretch is 5e-9.
 const BENT: f64 = 1.0e-4;
 
+/// Elements of bodies from which on they are worth several threads: an evaluation of so many takes 0.1 ms.
+const LARGE: usize = 4000;
+
+/// Whether bodies are worth several threads.
+pub(in crate::solver) fn are_large(bodies: &[BodyProblem]) -> bool {
+    bodies.iter().map(|body| body.model.tetrahedron_count()).sum::<usize>() > LARGE
+}
+
 /// Step of the matrix over that of time, of the second order.
 pub(crate) const SECOND_ORDER: f64 = 2.0 / 3.0;
 

@@ -6,8 +6,9 @@ use super::lists::ActiveContact;
 use super::rigid_proxy::Reaction;
 use crate::contact::{Constraint, Endpoint};
 use crate::math::Vec3;
-use crate::solver::body_step::{BodyProblem, Factors};
+use crate::solver::body_step::{BodyProblem, Factors, are_large};
 use crate::solver::cone::ConeOperator;
+use crate::threads::for_each_pair;
 
 /// What the last product has moved.
 #[derive(Default)]
@@ -83,11 +84,12 @@ impl ConeOperator for MatrixFree<'_> {
         for contact in self.contacts {
             self.scatter(&contact.constraint, &v[contact.rows()]);
         }
-        for (index, (body, response)) in self.bodies.iter_mut().zip(&mut self.response.bodies).enumerate() {
+        let (factors, large) = (self.factors, are_large(self.bodies));
+        for_each_pair(self.bodies, &mut self.response.bodies, large, |index, body, response| {
             if response.is_touched {
-                body.respond(self.factors.of(index, body), &response.forces, &mut response.motions);
+                body.respond(factors.of(index, body), &response.forces, &mut response.motions);
             }
-        }
+        });
         out.clear();
         for ActiveContact { constraint, .. } in self.contacts {
             let [a, b] = &constraint.endpoints;

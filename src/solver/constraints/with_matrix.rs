@@ -4,8 +4,9 @@ use super::delassus::ContactRows;
 use super::gaps::end;
 use super::improve::Around;
 use super::system::{Change, ContactSystem};
-use crate::solver::body_step::BodyProblem;
+use crate::solver::body_step::{BodyProblem, are_large};
 use crate::solver::cone::Effort;
+use crate::threads::for_each_item;
 
 /// Solves with a fresh shift of Newton's method.
 const SHIFT_ROUNDS: usize = 2;
@@ -119,9 +120,8 @@ impl ContactSystem {
         let changed = self.before != self.lambda;
         if changed {
             self.scatter_changes(bodies);
-            for (index, body) in bodies.iter_mut().enumerate() {
-                body.contact_step(around.factors.of(index, body));
-            }
+            let large = are_large(bodies);
+            for_each_item(bodies, large, |index, body| body.contact_step(around.factors.of(index, body)));
         }
         changed
     }
