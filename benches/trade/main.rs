@@ -8,6 +8,8 @@
 //! method to 1e-10 up to 1000 tetrahedra, and beyond the default solver to 1e-9, which comes to the same
 //! (`tests/solvers.rs`).
 
+#[path = "../shared/clock.rs"]
+mod clock;
 mod labels;
 mod methods;
 mod plot;
@@ -15,6 +17,8 @@ mod rapier;
 mod scenes;
 #[path = "../shared/mod.rs"]
 mod shared;
+mod touch;
+mod touch_report;
 
 use foible3d::prelude::*;
 use methods::{Choice, Method, methods, presets, reference};
@@ -47,6 +51,7 @@ fn main() {
             }
         }
     }
+    touch_report::run(is_wanted, &mut csv);
     if is_wanted("presets") {
         preset_table(&mut csv);
     }

@@ -203,6 +203,10 @@ pub struct SolverSettings {
     /// Iterate until the largest residual force is below this fraction of the largest force on a
     /// node (weight, internal or contact force, whichever is largest).
     pub tolerance: f64,
+    /// Contact forces are solved until what is left of their error is below this fraction of the largest of them, 1e-12
+    /// up to 0.1. Of bodies that touch one another, or one rigid body, the strictest counts.
+    /// What each value costs and leaves is measured in `docs/accuracy.md`.
+    pub contact_tolerance: f64,
     /// Acceleration.
     pub acceleration: Acceleration,
     /// Numbers of the factor.
@@ -224,6 +228,7 @@ impl Default for SolverSettings {
             clusters: 0,
             max_iterations: 10,
             tolerance: 5.0e-3,
+            contact_tolerance: 1.0e-8,
             acceleration: Acceleration::default(),
             precision: FactorPrecision::default(),
             integrator: Integrator::default(),
@@ -273,6 +278,12 @@ impl SolverSettings {
     #[must_use]
     pub fn tolerance(self, tolerance: f64) -> Self {
         Self { tolerance, ..self }
+    }
+
+    /// Sets the fraction of the largest contact force to which contact forces are solved.
+    #[must_use]
+    pub fn contact_tolerance(self, contact_tolerance: f64) -> Self {
+        Self { contact_tolerance, ..self }
     }
 
     /// Sets the acceleration.
