@@ -54,7 +54,7 @@ pub struct Touched {
 
 const H: f32 = 1.0 / 60.0;
 /// Runs of the same bits, of whose times the least of every step counts.
-const REPEATS: usize = 3;
+const REPEATS: usize = 2;
 /// Where a pad's middle is at the start, beyond what its nodes are carried, and the middle of a carrier \[m\].
 const PAD: [f32; 3] = [0.105, 0.1549, 0.18];
 

@@ -147,6 +147,11 @@ impl Build {
     }
 }
 
+/// Accuracies of contact forces that leave less of an error than the elasticity of [`Fidelity::Preview`] and of
+/// [`Fidelity::Game`] does.
+const SEEN: f64 = 1.0e-3;
+const FELT: f64 = 1.0e-4;
+
 impl Fidelity {
     /// The settings for a body of that build.
     pub(crate) fn settings(self, build: Build) -> SolverSettings {
@@ -154,17 +159,30 @@ impl Fidelity {
         let laplacian = SolverSettings { system: SystemMatrix::Laplacian, ..defaults };
         let newton = SolverSettings { solver: Solver::Newton, ..defaults };
         match (self, build) {
-            (Self::Preview, Build::Rope) => SolverSettings { max_iterations: 1, tolerance: 0.0, ..newton },
-            (Self::Preview, _) => {
-                SolverSettings { max_iterations: 1, tolerance: 0.0, clusters: 8, ..laplacian }
+            (Self::Preview, Build::Rope) => {
+                SolverSettings { max_iterations: 1, tolerance: 0.0, contact_tolerance: SEEN, ..newton }
             }
-            (Self::Game, Build::Solid) => SolverSettings { tolerance: 4.0 * defaults.tolerance, ..defaults },
-            (Self::Game, _) => build.defaults(),
+            (Self::Preview, _) => SolverSettings {
+                max_iterations: 1,
+                tolerance: 0.0,
+                contact_tolerance: SEEN,
+                clusters: 8,
+                ..laplacian
+            },
+            (Self::Game, Build::Solid) => {
+                SolverSettings { tolerance: 4.0 * defaults.tolerance, contact_tolerance: FELT, ..defaults }
+            }
+            (Self::Game, _) => SolverSettings { contact_tolerance: FELT, ..build.defaults() },
             (Self::Engineering, Build::Solid) => {
                 SolverSettings { max_iterations: 50, tolerance: 1.0e-5, ..defaults }
             }
             (Self::Engineering, _) => SolverSettings { max_iterations: 30, tolerance: 1.0e-5, ..newton },
-            (Self::Reference, _) => SolverSettings { max_iterations: 100, tolerance: 1.0e-10, ..newton },
+            (Self::Reference, _) => SolverSettings {
+                max_iterations: 100,
+                tolerance: 1.0e-10,
+                contact_tolerance: 1.0e-10,
+                ..newton
+            },
         }
     }
 }
