@@ -197,3 +197,22 @@ fn values_out_of_range_are_brought_into_it() {
         assert_eq!(built(value), expected, "{value}");
     }
 }
+
+#[test]
+fn a_box_of_a_hundred_times_the_mass_stands_at_the_cheap_presets_too() {
+    for fidelity in [Fidelity::Preview, Fidelity::Game] {
+        let (mut physics, floor) = world_with_floor(H);
+        let mut world = DeformableWorld::new();
+        let stiff = DeformableMaterial::new(1e8, 0.3).friction(MU).mass_damping(4.0);
+        world.insert(cube(stiff, 0.2).fidelity(fidelity)).unwrap();
+        let heavy = ColliderBuilder::cuboid(0.2, 0.2, 0.2).density(1e5).friction(MU as f32);
+        let body = RigidBodyBuilder::dynamic().translation(Vector::Y * 0.6).can_sleep(false);
+        let (body, _) = physics.insert(body, heavy);
+        (0..180).for_each(|_| world.step(&mut physics));
+        let force: f64 = world.contacts_with(floor).map(|c| f64::from(c.force.y)).sum();
+        let error = (force / (101.0 * 64.0 * G) - 1.0).abs();
+        let speed = physics.bodies[body].linvel().length();
+        println!("{fidelity:?}: force off by {error:.1e}, the box moves at {speed:.1e} m/s");
+        assert!(error < 1e-3 && speed < 1e-2, "{fidelity:?}: {error:e}, {speed:e} m/s");
+    }
+}

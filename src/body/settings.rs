@@ -124,13 +124,13 @@ impl Default for Acceleration {
 #[non_exhaustive]
 pub enum Fidelity {
     /// One iteration of the [`SystemMatrix::Laplacian`], with eight clusters: the smallest factors, the fewest
-    /// solves, and motion that looks right; of ropes one iteration of Newton's method.
+    /// solves, and motion that looks right; of ropes one iteration of Newton's method. Contact forces to 1e-3.
     Preview,
-    /// The defaults, at four times their tolerance.
+    /// The defaults, at four times their tolerance, and contact forces to 1e-4.
     Game,
     /// Iterated until less than a hundredth of the error of [`Fidelity::Game`] is left; sheets by Newton's method.
     Engineering,
-    /// [`Solver::Newton`] until little but rounding is left.
+    /// [`Solver::Newton`] until little but rounding is left, and contact forces to 1e-10.
     Reference,
 }
 
@@ -221,9 +221,10 @@ pub struct SolverSettings {
     /// Iterate until the largest residual force is below this fraction of the largest force on a
     /// node (weight, internal or contact force, whichever is largest).
     pub tolerance: f64,
-    /// Contact forces are solved until what is left of their error is below this fraction of the largest of them, 1e-12
-    /// up to 0.1. Of bodies that touch one another, or one rigid body, the strictest counts.
-    /// What each value costs and leaves is measured in `docs/accuracy.md`.
+    /// Contact forces are solved until another look at a contact would change none by more than this fraction of the
+    /// largest of them, 1e-12 up to 0.1, or [`contact_iterations`](crate::DeformableParameters::contact_iterations) are
+    /// done. Of bodies that are solved together, as they touch one another or one rigid body that moves, the strictest
+    /// counts. Beyond 1e-5 it takes cheaper methods; what it costs and leaves is in `docs/accuracy.md`.
     pub contact_tolerance: f64,
     /// Acceleration.
     pub acceleration: Acceleration,
