@@ -8,6 +8,7 @@
 //! steps with what they did, and the claims that this run holds or does not. Writes `target/crowds.csv`.
 
 mod claims;
+#[path = "../shared/clock.rs"]
 mod clock;
 mod engines;
 mod groups;

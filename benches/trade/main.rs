@@ -1,6 +1,7 @@
 //! What accuracy costs: every solver and preset over a set of scenes, against Newton's method and
-//! rapier's own soft bodies. `cargo bench --bench trade`; `-- NAME` for the scenes of
-//! that name alone, or the tables of `presets` or `steps`; `-- plot` draws `target/trade.csv` again without a run.
+//! rapier's own soft bodies, and the accuracy of contact over scenes of contact. `cargo bench --bench trade`; `-- NAME`
+//! for the scenes of that name alone, those of contact by `touch`, or the tables of `presets` or `steps`; `-- plot` draws
+//! `target/trade.csv` again without a run.
 //!
 //! Prints tables, writes `target/trade.csv` and `target/trade.svg` (that of `docs/` is a copy). One thread: a scene
 //! has one island. Error: of paths the root mean square distance from the reference's at the same step and mesh, of
@@ -8,6 +9,8 @@
 //! method to 1e-10 up to 1000 tetrahedra, and beyond the default solver to 1e-9, which comes to the same
 //! (`tests/solvers.rs`).
 
+#[path = "../shared/clock.rs"]
+mod clock;
 mod labels;
 mod methods;
 mod plot;
@@ -15,6 +18,8 @@ mod rapier;
 mod scenes;
 #[path = "../shared/mod.rs"]
 mod shared;
+mod touch;
+mod touch_report;
 
 use foible3d::prelude::*;
 use methods::{Choice, Method, methods, presets, reference};
@@ -47,6 +52,7 @@ fn main() {
             }
         }
     }
+    let broken = touch_report::run(is_wanted, &mut csv);
     if is_wanted("presets") {
         preset_table(&mut csv);
     }
@@ -56,12 +62,12 @@ fn main() {
         mode_table();
     }
     // The plot is of everything.
-    if only.is_some() {
-        return;
+    if only.is_none() {
+        std::fs::write(&table, csv).expect("target can be written to");
+        plot::draw(&table, &picture).expect("target can be written to");
+        println!("\nwritten to target/trade.csv and target/trade.svg");
     }
-    std::fs::write(&table, csv).expect("target can be written to");
-    plot::draw(&table, &picture).expect("target can be written to");
-    println!("\nwritten to target/trade.csv and target/trade.svg");
+    assert!(broken.is_empty(), "claims that do not hold:\n{}", broken.join("\n"));
 }
 
 fn report(scene: &Scene, family: &str, method: &str, record: &Record, truth: &Record, csv: &mut String) {

@@ -1,4 +1,4 @@
-//! Error against time, one panel per scene, drawn from the CSV.
+//! Error against time, one panel per scene, drawn from the CSV: of positions, and below them of contact forces.
 
 use crate::labels::{Area, Labels};
 use plotters::coord::Shift;
@@ -7,15 +7,29 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::error::Error;
 use std::path::Path;
 
-const PANELS: [&str; 4] = ["sagging cantilever", "swinging cantilever", "drop and rest", "cloth at rest"];
+const PANELS: [&str; 9] = [
+    "sagging cantilever",
+    "swinging cantilever",
+    "drop and rest",
+    "cloth at rest",
+    "landing",
+    "resting",
+    "sliding",
+    "grasping",
+    "piling",
+];
+/// From this one on the error is that of contact forces.
+const FIRST_CONTACT: usize = 4;
 
 /// Families in the order of their colours (Okabe and Ito's, told apart by the colour-blind too).
-const FAMILIES: [(&str, RGBColor); 7] = [
+const FAMILIES: [(&str, RGBColor); 9] = [
     ("rest stiffness", RGBColor(0, 114, 178)),
     ("Laplacian", RGBColor(0, 158, 115)),
     ("Gauss–Seidel", RGBColor(204, 121, 167)),
     ("Jacobi", RGBColor(170, 130, 60)),
     ("Newton", RGBColor(230, 159, 0)),
+    ("contact at Game", RGBColor(0, 114, 178)),
+    ("contact at Engineering", RGBColor(230, 159, 0)),
     ("preset", RGBColor(0, 0, 0)),
     ("rapier", RGBColor(200, 30, 30)),
 ];
@@ -24,7 +38,7 @@ const FAMILIES: [(&str, RGBColor); 7] = [
 const LEAST: f64 = 1.0e-7;
 
 /// Of the whole picture, as wide as GitHub shows it, and of its frames \[px\].
-const SIZE: (u32, u32) = (920, 784);
+const SIZE: (u32, u32) = (920, 784 + 3 * 394);
 const FRAME: [f64; 2] = [312.0, 304.0];
 const LEGEND_X: i32 = 782;
 
@@ -51,10 +65,17 @@ pub fn draw(csv: &Path, path: &Path) -> Drawn {
         let own: Vec<&Point> = points.iter().filter(|p| p.scene == *scene && p.error.is_finite()).collect();
         let low = [70.0 + 376.0 * (i % 2) as f64, 36.0 + 394.0 * (i / 2) as f64];
         let panel = Panel::new(Area { low, high: [low[0] + FRAME[0], low[1] + FRAME[1]] }, &own);
-        panel.draw_axes(&canvas, scene)?;
+        let title = if i < FIRST_CONTACT { "error" } else { "error of contact forces" };
+        panel.draw_axes(&canvas, scene, title)?;
         panel.draw_points(&canvas, &own)?;
     }
-    draw_legend(&canvas)?;
+    let is_contact = |family: &str| family.starts_with("contact");
+    let solvers = FAMILIES.iter().filter(|(family, _)| !is_contact(family)).collect::<Vec<_>>();
+    let notes = ["Points along a line:", "more iterations.", "", "Down and to the", "left is better."];
+    draw_legend(&canvas, 44.0, &solvers, &notes)?;
+    let contact = FAMILIES.iter().filter(|(family, _)| is_contact(family) || is_named(family));
+    let notes = ["Along a line: contact", "tolerance from 0.1", "to 1e-10."];
+    draw_legend(&canvas, 44.0 + 2.0 * 394.0, &contact.collect::<Vec<_>>(), &notes)?;
     canvas.present()?;
     Ok(())
 }
@@ -65,7 +86,7 @@ fn read(csv: &str) -> Result<Vec<Point>, Box<dyn Error>> {
     for line in csv.lines().skip(1) {
         // scene, engine, setting, tets, dt, ms, worst, error and three more; settings may hold commas.
         let fields: Vec<&str> = line.split(',').collect();
-        let [scene, _, setting @ .., _, _, ms, _, error, _, _, _] = &fields[..] else {
+        let [scene, _, setting @ .., _, _, ms, _, error, _, force, _] = &fields[..] else {
             return Err(format!("not a line of this bench: {line}").into());
         };
         let setting = setting.join(",");
@@ -73,7 +94,8 @@ fn read(csv: &str) -> Result<Vec<Point>, Box<dyn Error>> {
         let Some((family, name)) = FAMILIES.iter().enumerate().find_map(named) else {
             continue;
         };
-        let (ms, error) = (ms.parse()?, error.parse()?);
+        let is_contact = PANELS[FIRST_CONTACT..].contains(scene);
+        let (ms, error) = (ms.parse()?, if is_contact { force } else { error }.parse()?);
         points.push(Point { scene: scene.to_string(), family, name: name.into(), ms, error });
     }
     Ok(points)
@@ -111,13 +133,13 @@ impl Panel {
         self.pixel([point.ms.log10(), point.error.max(LEAST).log10()])
     }
 
-    fn draw_axes(&self, canvas: &Canvas, scene: &str) -> Drawn {
+    fn draw_axes(&self, canvas: &Canvas, scene: &str, error: &str) -> Drawn {
         let Area { low, high } = self.frame;
         let middle = self.frame.center();
         text(canvas, scene, [middle[0], low[1] - 14.0], (18, &BLACK), HPos::Center)?;
         text(canvas, "milliseconds per step", [middle[0], high[1] + 36.0], (15, &GREY), HPos::Center)?;
         let upright = style(15, &GREY, HPos::Center).transform(FontTransform::Rotate270);
-        canvas.draw(&Text::new("error", whole([low[0] - 52.0, middle[1]]), upright))?;
+        canvas.draw(&Text::new(error, whole([low[0] - 52.0, middle[1]]), upright))?;
         for exponent in self.low[0].floor() as i32..=self.high[0].ceil() as i32 {
             for digit in [1.0, 2.0, 5.0] {
                 let value = digit * 10f64.powi(exponent);
@@ -183,20 +205,23 @@ fn is_named(family: &str) -> bool {
     matches!(family, "preset" | "rapier")
 }
 
-fn draw_legend(canvas: &Canvas) -> Drawn {
-    let x = f64::from(LEGEND_X);
-    let mut y = 44.0;
-    for (family, color) in FAMILIES {
+fn draw_legend(canvas: &Canvas, top: f64, families: &[&(&str, RGBColor)], notes: &[&str]) -> Drawn {
+    let (x, mut y) = (f64::from(LEGEND_X), top);
+    for (family, color) in families {
         if is_named(family) {
             y += 6.0;
         } else {
             line(canvas, [x, y], [x + 24.0, y], color.mix(1.0))?;
         }
         marker(canvas, [x + 12.0, y], family)?;
-        text(canvas, family, [x + 32.0, y], (16, &BLACK), HPos::Left)?;
+        // The margin is narrow.
+        for (k, part) in family.split_inclusive(" at ").enumerate() {
+            y += 16.0 * k as f64;
+            text(canvas, part.trim_end(), [x + 32.0, y], (16, &BLACK), HPos::Left)?;
+        }
         y += 22.0;
     }
-    for note in ["Points along a line:", "more iterations.", "", "Down and to the", "left is better."] {
+    for note in notes {
         y += 17.0;
         text(canvas, note, [x, y], (14, &GREY), HPos::Left)?;
     }

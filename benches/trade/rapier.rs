@@ -89,7 +89,7 @@ fn builder(scene: &Scene, setting: &str) -> Option<(SoftBodyBuilder, Vec<[f64; 3
     })
 }
 
-fn tune(physics: &mut PhysicsWorld, setting: &str) {
+pub fn tune(physics: &mut PhysicsWorld, setting: &str) {
     if setting != "default" {
         physics.integration_parameters.num_solver_iterations = 1;
         physics.integration_parameters.soft_bodies.fem.max_linear_iterations = 400;

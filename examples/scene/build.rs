@@ -172,6 +172,7 @@ fn solved_by(builder: DeformableBodyBuilder, asked: &file::Solver) -> Deformable
         }
         settings.max_iterations = asked.max_iterations.unwrap_or(settings.max_iterations);
         settings.tolerance = asked.tolerance.unwrap_or(settings.tolerance);
+        settings.contact_tolerance = asked.contact_tolerance.unwrap_or(settings.contact_tolerance);
         settings.acceleration = match asked.lbfgs {
             Some(0) => Acceleration::None,
             Some(window) => Acceleration::Lbfgs { window },

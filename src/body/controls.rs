@@ -8,6 +8,8 @@ use rapier3d::geometry::InteractionGroups;
 
 /// Clusters of a body at the most.
 const MAX_CLUSTERS: usize = 32;
+/// Accuracies of contact forces: below the first there is only rounding, beyond the last forces are hardly solved for.
+const CONTACT_TOLERANCES: [f64; 2] = [1.0e-12, 0.1];
 
 impl DeformableBody {
     /// The material.
@@ -39,6 +41,9 @@ impl DeformableBody {
         settings.clusters = settings.clusters.min(MAX_CLUSTERS);
         // NaN too becomes zero: iterate to the limit.
         settings.tolerance = settings.tolerance.max(0.0);
+        let [finest, coarsest] = CONTACT_TOLERANCES;
+        // NaN too becomes the finest.
+        settings.contact_tolerance = settings.contact_tolerance.max(finest).min(coarsest);
         match &mut settings.acceleration {
             Acceleration::Lbfgs { window } | Acceleration::Anderson { window } => {
                 *window = (*window).clamp(1, 16);

@@ -124,13 +124,13 @@ impl Default for Acceleration {
 #[non_exhaustive]
 pub enum Fidelity {
     /// One iteration of the [`SystemMatrix::Laplacian`], with eight clusters: the smallest factors, the fewest
-    /// solves, and motion that looks right; of ropes one iteration of Newton's method.
+    /// solves, and motion that looks right; of ropes one iteration of Newton's method. Contact forces to 1e-3.
     Preview,
-    /// The defaults, at four times their tolerance.
+    /// The defaults, at four times their tolerance, and contact forces to 1e-4.
     Game,
     /// Iterated until less than a hundredth of the error of [`Fidelity::Game`] is left; sheets by Newton's method.
     Engineering,
-    /// [`Solver::Newton`] until little but rounding is left.
+    /// [`Solver::Newton`] until little but rounding is left, and contact forces to 1e-10.
     Reference,
 }
 
@@ -147,6 +147,11 @@ impl Build {
     }
 }
 
+/// Accuracies of contact forces that leave less of an error than the elasticity of [`Fidelity::Preview`] and of
+/// [`Fidelity::Game`] does.
+const SEEN: f64 = 1.0e-3;
+const FELT: f64 = 1.0e-4;
+
 impl Fidelity {
     /// The settings for a body of that build.
     pub(crate) fn settings(self, build: Build) -> SolverSettings {
@@ -154,17 +159,30 @@ impl Fidelity {
         let laplacian = SolverSettings { system: SystemMatrix::Laplacian, ..defaults };
         let newton = SolverSettings { solver: Solver::Newton, ..defaults };
         match (self, build) {
-            (Self::Preview, Build::Rope) => SolverSettings { max_iterations: 1, tolerance: 0.0, ..newton },
-            (Self::Preview, _) => {
-                SolverSettings { max_iterations: 1, tolerance: 0.0, clusters: 8, ..laplacian }
+            (Self::Preview, Build::Rope) => {
+                SolverSettings { max_iterations: 1, tolerance: 0.0, contact_tolerance: SEEN, ..newton }
             }
-            (Self::Game, Build::Solid) => SolverSettings { tolerance: 4.0 * defaults.tolerance, ..defaults },
-            (Self::Game, _) => build.defaults(),
+            (Self::Preview, _) => SolverSettings {
+                max_iterations: 1,
+                tolerance: 0.0,
+                contact_tolerance: SEEN,
+                clusters: 8,
+                ..laplacian
+            },
+            (Self::Game, Build::Solid) => {
+                SolverSettings { tolerance: 4.0 * defaults.tolerance, contact_tolerance: FELT, ..defaults }
+            }
+            (Self::Game, _) => SolverSettings { contact_tolerance: FELT, ..build.defaults() },
             (Self::Engineering, Build::Solid) => {
                 SolverSettings { max_iterations: 50, tolerance: 1.0e-5, ..defaults }
             }
             (Self::Engineering, _) => SolverSettings { max_iterations: 30, tolerance: 1.0e-5, ..newton },
-            (Self::Reference, _) => SolverSettings { max_iterations: 100, tolerance: 1.0e-10, ..newton },
+            (Self::Reference, _) => SolverSettings {
+                max_iterations: 100,
+                tolerance: 1.0e-10,
+                contact_tolerance: 1.0e-10,
+                ..newton
+            },
         }
     }
 }
@@ -203,6 +221,11 @@ pub struct SolverSettings {
     /// Iterate until the largest residual force is below this fraction of the largest force on a
     /// node (weight, internal or contact force, whichever is largest).
     pub tolerance: f64,
+    /// Contact forces are solved until another look at a contact would change none by more than this fraction of the
+    /// largest of them, 1e-12 up to 0.1, or [`contact_iterations`](crate::DeformableParameters::contact_iterations) are
+    /// done. Of bodies that are solved together, as they touch one another or one rigid body that moves, the strictest
+    /// counts. Beyond 1e-5 it takes cheaper methods; what it costs and leaves is in `docs/accuracy.md`.
+    pub contact_tolerance: f64,
     /// Acceleration.
     pub acceleration: Acceleration,
     /// Numbers of the factor.
@@ -224,6 +247,7 @@ impl Default for SolverSettings {
             clusters: 0,
             max_iterations: 10,
             tolerance: 5.0e-3,
+            contact_tolerance: 1.0e-8,
             acceleration: Acceleration::default(),
             precision: FactorPrecision::default(),
             integrator: Integrator::default(),
@@ -273,6 +297,12 @@ impl SolverSettings {
     #[must_use]
     pub fn tolerance(self, tolerance: f64) -> Self {
         Self { tolerance, ..self }
+    }
+
+    /// Sets the fraction of the largest contact force to which contact forces are solved.
+    #[must_use]
+    pub fn contact_tolerance(self, contact_tolerance: f64) -> Self {
+        Self { contact_tolerance, ..self }
     }
 
     /// Sets the acceleration.

@@ -12,14 +12,11 @@ use std::time::Duration;
 /// deformables.parameters = DeformableParameters::default().neighbourhood_bodies(8).column_budget(64 << 20);
 /// // Or one of them, as the fields are public.
 /// deformables.parameters.restitution_threshold = 0.2;
-/// assert_eq!(deformables.parameters.contact_tolerance, 1.0e-8);
+/// assert_eq!(deformables.parameters.contact_iterations, 120);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DeformableParameters {
-    /// Relative accuracy to which contact forces are solved. At 1e-6 a symmetric stack of 1000:1
-    /// begins to sway, at 1e-8 it does not; Newton's method gets there in one more step.
-    pub contact_tolerance: f64,
     /// Speed [m/s] at which overlaps found at the start of a step are undone.
     pub max_corrective_velocity: f64,
     /// New contacts that approach below this speed [m/s] do not bounce.
@@ -39,7 +36,6 @@ pub struct DeformableParameters {
 impl Default for DeformableParameters {
     fn default() -> Self {
         Self {
-            contact_tolerance: 1.0e-8,
             max_corrective_velocity: 1.0,
             restitution_threshold: 0.5,
             neighbourhood_bodies: 64,
@@ -50,12 +46,6 @@ impl Default for DeformableParameters {
 }
 
 impl DeformableParameters {
-    /// Sets the relative accuracy of contact forces.
-    #[must_use]
-    pub fn contact_tolerance(self, contact_tolerance: f64) -> Self {
-        Self { contact_tolerance, ..self }
-    }
-
     /// Sets the speed [m/s] at which overlaps are undone.
     #[must_use]
     pub fn max_corrective_velocity(self, max_corrective_velocity: f64) -> Self {
@@ -90,8 +80,6 @@ impl DeformableParameters {
         ContactLimits {
             recovery_speed: self.max_corrective_velocity.max(0.0),
             restitution_threshold: self.restitution_threshold.max(0.0),
-            // Below 1e-12 there is only rounding; NaN becomes that too.
-            tolerance: self.contact_tolerance.max(1e-12),
             iterations: self.contact_iterations,
         }
     }

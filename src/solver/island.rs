@@ -248,7 +248,7 @@ impl Island {
     fn solve_contacts(&mut self, context: &SolveContext<'_>) {
         let heaviest = self.bodies.iter().map(|b| b.weight).fold(0.0, f64::max);
         let tolerance = ConeTolerance {
-            relative: context.limits.tolerance,
+            relative: self.bodies.iter().map(|b| b.settings.contact_tolerance).fold(f64::INFINITY, f64::min),
             // Without gravity or forces any positive number serves as the scale of nothing.
             floor: (1e-3 * heaviest).max(1e-12),
         };

@@ -13,7 +13,7 @@ use crate::fem::SystemMatrix;
 use crate::math::{Mat3, Vec3};
 
 pub(super) const LIMITS: ContactLimits =
-    ContactLimits { recovery_speed: 1.0, restitution_threshold: 0.5, tolerance: 1e-12, iterations: 60 };
+    ContactLimits { recovery_speed: 1.0, restitution_threshold: 0.5, iterations: 60 };
 
 /// A bent body with contacts at its lowest nodes.
 pub(super) fn touching() -> (FactorCache, Island) {
@@ -38,6 +38,7 @@ pub(super) fn touching() -> (FactorCache, Island) {
         island.contacts.push(constraint);
     }
     island.bodies.push(problem);
+    island.bodies[0].settings.contact_tolerance = 1e-12;
     (cache, island)
 }
 
@@ -76,7 +77,7 @@ fn impulses_on_the_two_sides_cancel() {
 fn solved_contacts_obey_signorini_and_coulomb() {
     let proxy = plate();
     let (cache, mut island) = touching();
-    island.bodies[0].settings = SolverSettings::iterations(100);
+    island.bodies[0].settings = SolverSettings::iterations(100).contact_tolerance(1e-12);
     island.solve(&SolveContext { factors: &cache, proxies: &proxy, h: H, limits: &LIMITS });
     let contacts: &ContactSystem = &island.contacts;
     let mut carrying = 0;

@@ -154,6 +154,7 @@ pub struct Solver {
     pub frames: Option<Frames>,
     pub max_iterations: Option<usize>,
     pub tolerance: Option<f64>,
+    pub contact_tolerance: Option<f64>,
     /// Pairs of L-BFGS; 0 for none.
     pub lbfgs: Option<usize>,
 }

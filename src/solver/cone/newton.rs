@@ -24,6 +24,8 @@ const WARM_STEPS: usize = 4;
 /// Forces are left as they are at the start if they are no worse than the tolerance times this. A
 /// hundred times more, and a symmetric stack of 1000:1 begins to sway.
 const AS_GOOD: f64 = 100.0;
+/// The same error beyond which they are not: from there on the tolerance itself counts.
+const GOOD: f64 = 1.0e-6;
 /// Error of a warm start, after the active-set predictor, from which on continuation begins at once.
 const TOO_FAR: f64 = 0.2;
 /// Accuracy of the stages below the last.
@@ -172,10 +174,11 @@ impl ConeSolver {
         self.Wz.extend_from_slice(W_lambda);
         self.project(problem);
         let scale = largest(self.gamma.iter().copied()).max(tolerance.floor);
+        let enough = (AS_GOOD * tolerance.relative).min(tolerance.relative.max(GOOD));
         (0..problem.contacts()).all(|i| {
             let rows = problem.offsets[i]..problem.offsets[i + 1];
             let error = largest(rows.map(|k| lambda[k] - self.gamma[k]));
-            error.is_finite() && error <= AS_GOOD * tolerance.relative * scale
+            error.is_finite() && error <= enough * scale
         })
     }
 

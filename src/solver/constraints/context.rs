@@ -20,8 +20,6 @@ pub(crate) struct ContactLimits {
     pub recovery_speed: f64,
     /// Approach below this speed does not bounce [m/s].
     pub restitution_threshold: f64,
-    /// Relative accuracy of the forces.
-    pub tolerance: f64,
     /// Sweeps over the contacts, or products with W in their place, per island and step.
     pub iterations: usize,
 }

@@ -2,7 +2,7 @@
 //! cost more than the contacts are worth.
 
 use super::coarse_space::CoarseParts;
-use super::improve::Around;
+use super::improve::{Around, LOOSE};
 use super::matrix_free::MatrixFree;
 use super::system::{Change, ContactSystem};
 use crate::solver::body_step::BodyProblem;
@@ -32,7 +32,9 @@ impl ContactSystem {
     pub(super) fn improve_without_matrix(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) -> bool {
         self.update_metric(bodies, around);
         self.set_gradient(around.tolerance);
-        let error = REDUCTION * self.work.error;
+        // A preview has no next outer iteration.
+        let is_loose = around.tolerance.relative > LOOSE;
+        let error = if is_loose { around.tolerance.relative } else { REDUCTION * self.work.error };
         let mut changed = false;
         for round in 0..SHIFT_ROUNDS {
             let left = around.context.limits.iterations.saturating_sub(self.spent.iterations) / PRODUCT_COST;
