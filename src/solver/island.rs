@@ -91,7 +91,7 @@ impl Island {
             let done = match outcome {
                 Outcome::Stalled => true,
                 Outcome::Turned => false,
-                Outcome::Descended => self.bodies.iter().all(converged),
+                Outcome::Descended => self.contacts.is_nearly_solved() && self.bodies.iter().all(converged),
             };
             if done {
                 break;
