@@ -60,8 +60,8 @@ const ROUNDS: usize = 4;
 /// How near to touching a contact is taken into the problem before it is solved: of what moves, others will move it too.
 const NEARLY_CLOSED: Slack = Slack { edges: 0.01, motions: 0.1 };
 /// As [`NEARLY_CLOSED`], once it has been solved.
-const OVERLAPPING: Slack = Slack { edges: -1.0e-5, motions: 0.0 };
-/// Residual over forces beyond which a step is looked at again.
+const OVERLAPPING: Slack = Slack { edges: -1.0e-5, motions: 0.1 };
+/// Residual over forces, and error of contact forces, beyond which a step goes on and is looked at again.
 const FAR_FROM_SOLVED: f64 = 0.1;
 /// Largest factor on A that the guard tries.
 const MAX_STEP_DAMPING: f64 = 1024.0;
@@ -91,7 +91,7 @@ impl Island {
             let done = match outcome {
                 Outcome::Stalled => true,
                 Outcome::Turned => false,
-                Outcome::Descended => self.contacts.is_nearly_solved() && self.bodies.iter().all(converged),
+                Outcome::Descended => self.contacts_are_done() && self.bodies.iter().all(converged),
             };
             if done {
                 break;
@@ -109,6 +109,11 @@ impl Island {
             self.reject_steps_that_gain_energy(context);
         }
         self.bodies.iter().for_each(|b| self.report.counters.add(&b.preconditioner.counters));
+    }
+
+    /// Whether the contacts are not far from solved, or the step's iterations over them are spent.
+    fn contacts_are_done(&self) -> bool {
+        self.contacts.work.error <= FAR_FROM_SOLVED || self.contacts.work.is_exhausted
     }
 
     /// Bodies whose step is far from solved and would gain energy are rejected: where forces change wildly from iteration

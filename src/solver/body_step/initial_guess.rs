@@ -8,8 +8,9 @@ use crate::solver::linear::SystemFactor;
 
 /// Largest rotation of an element against the body's frame for which one frame serves.
 const FLOATING_LIMIT: f64 = 20.0 * std::f64::consts::PI / 180.0;
-/// Rotation of the body against its frame \[rad\] beyond which the frame is turned after it within a step, and W made anew.
-const FRAME_DRIFT: f64 = 1.0e-2;
+/// Rotation of the body against its frame \[rad\] beyond which the frame follows it within a step, and its blocks of W are
+/// made anew.
+const FRAME_DRIFT: f64 = 1.0e-3;
 
 impl BodyProblem {
     /// Chooses where the iteration starts, and the frames of the preconditioner: the rigidly extrapolated

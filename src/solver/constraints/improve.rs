@@ -40,8 +40,6 @@ const WARM_WORK: usize = 120;
 const WARM_FAILURES: usize = 2;
 /// Error of the last sweep from which on it is tried again.
 const NEARLY_SOLVED: f64 = 1.0e-2;
-/// Error of the forces beyond which the step is not done while there is something left of its budget.
-pub(crate) const FAR_FROM_SOLVED: f64 = 0.1;
 /// Overlap that sweeps may leave in a small island, in mean edges.
 const OVERLAP_LEFT: f64 = 0.05;
 
@@ -102,11 +100,6 @@ impl ContactSystem {
         };
         self.measure(bodies, context);
         self.solve_by_newton(bodies, around, effort).unwrap_or(false) | changed
-    }
-
-    /// Whether the contacts are as good as solved, or the step's iterations over them are spent.
-    pub fn is_nearly_solved(&self) -> bool {
-        self.work.error <= FAR_FROM_SOLVED || self.work.is_exhausted
     }
 
     /// Whether something rigid that yields might take part: sweeps carry a load through light things slowly.
