@@ -50,6 +50,18 @@ pub fn heaps(all: bool, report: &mut Report) {
     }
 }
 
+/// A pile on one thread and on two, by the clock on the wall.
+pub fn threads(report: &mut Report) {
+    let scene = scenes::heap(48);
+    let wall = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool");
+        let run = pool.install(|| engines::run(Engine::Foible, &scene));
+        run.counters.iter().map(|c| c.total_time().as_secs_f64()).sum::<f64>()
+    };
+    let ratio = report.measure(&scene.name, THREADS, wall(1) / wall(2));
+    println!("{}: {ratio:.2} times as fast on two threads as on one", scene.name);
+}
+
 /// The same heap, allowed to sleep. What it takes when settled is the median of the last second of the longer of the two
 /// runs: small heaps sleep before they could show it, big ones settle later than the run that never sleeps.
 fn sleep(count: usize, awake: &Run, report: &mut Report) {
