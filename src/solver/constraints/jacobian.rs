@@ -10,6 +10,8 @@ use crate::solver::linear::BlockForm;
 use nalgebra::Vector6;
 
 /// What one endpoint of a contact moves, along the contact's directions, with its sign.
+// Most are soft, and boxes would be allocated in every step.
+#[allow(clippy::large_enum_variant)]
 pub(super) enum JacobianColumn {
     /// Fixed or kinematic.
     Idle,
