@@ -160,6 +160,40 @@ fn steps_of_unusable_length_are_skipped() {
     assert_eq!(world.bodies[body].state(), &before);
 }
 
+/// As many obstacles as make a tree of their boxes.
+#[test]
+fn a_rigid_body_that_is_nowhere_is_no_obstacle_and_hides_none() {
+    let load = |places: &[Vector]| {
+        let (mut physics, floor) = world_with_floor(1.0 / 60.0);
+        for k in 0..60 {
+            let far = RigidBodyBuilder::fixed().translation(Vector::new(5.0 + k as f32, 0.0, 0.0));
+            physics.insert(far, ColliderBuilder::ball(0.1));
+        }
+        for place in places {
+            let nowhere = RigidBodyBuilder::kinematic_velocity_based().translation(*place);
+            physics.insert(nowhere, ColliderBuilder::ball(0.1));
+        }
+        let mut world = DeformableWorld::new();
+        let body = world.insert(cube(DeformableMaterial::new(1e6, 0.3), 0.101)).unwrap();
+        for _ in 0..3 {
+            let mut parts = PhysicsParts::from(&mut physics);
+            world.pipeline.before_step(&world.parameters, &mut world.bodies, &mut parts);
+        }
+        assert!(world.pipeline.contacts().iter().all(|c| c.collider == floor));
+        (world.pipeline.contacts().len(), world.bodies[body].state().clone())
+    };
+    let alone = load(&[]);
+    assert!(alone.0 > 4);
+    let (nan, infinite) = (f32::NAN, f32::INFINITY);
+    let nowhere = [
+        Vector::splat(nan),
+        Vector::new(nan, 0.0, 0.0),
+        Vector::new(0.0, infinite, 0.0),
+        Vector::splat(infinite),
+    ];
+    assert_eq!(load(&nowhere), alone);
+}
+
 #[test]
 fn bad_requests_are_named_and_change_nothing() {
     let mut world = DeformableWorld::new();

@@ -60,6 +60,10 @@ impl RapierScene {
                     (proxy, pose, pose)
                 }
             };
+            // A user's NaN is nowhere, and nothing touches it.
+            if !(start.is_finite() && end.is_finite()) {
+                continue;
+            }
             self.push_shape(handle, proxy, collider.shared_shape().clone(), start, end);
         }
         self.meshes.finish();

@@ -88,6 +88,11 @@ pub(crate) struct Pose64 {
 }
 
 impl Pose64 {
+    /// Whether it is a place: no NaN, nothing infinite.
+    pub fn is_finite(&self) -> bool {
+        self.translation.iter().chain(&self.rotation).all(|v| v.is_finite())
+    }
+
     /// Widens rapier's pose; the quaternion is normalised in `f64`, so the matrix is a rotation
     /// to 1e-16 and not to 1e-7.
     pub fn from_real(pose: &rapier3d::math::Pose) -> Self {

@@ -68,10 +68,11 @@ impl Delassus {
     ) -> bool {
         let ContactRows { contacts, offsets, groups } = rows;
         self.fresh.describe(contacts, bodies, factors, proxies, h);
+        // Also where W is known: it may be known of other bodies.
+        self.mark_changed(bodies, factors);
         let is_known = self.fresh.comparable && self.fresh == self.made_from;
         if !is_known {
             std::mem::swap(&mut self.fresh, &mut self.made_from);
-            self.mark_changed(bodies, factors);
             self.jacobian.clear();
             for contact in &*contacts {
                 let jacobian_column = |k: usize| JacobianColumn::new(contact, k, bodies, proxies, h);

@@ -32,7 +32,7 @@ impl ContactSystem {
     pub(super) fn improve_without_matrix(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) -> bool {
         self.update_metric(bodies, around);
         self.set_gradient(around.tolerance);
-        // A preview has no next outer iteration.
+        // Loose ones go all the way at once: a preview has no next outer iteration.
         let is_loose = around.tolerance.relative > LOOSE;
         let error = if is_loose { around.tolerance.relative } else { REDUCTION * self.work.error };
         let mut changed = false;
