@@ -58,9 +58,9 @@ enum Outcome {
 /// Contact problems in one iteration.
 const ROUNDS: usize = 4;
 /// How near to touching a contact is taken into the problem before it is solved: of what moves, others will move it too.
-const NEARLY_CLOSED: Slack = Slack { edges: 0.01, motions: 0.1 };
+const NEARLY_CLOSED: Slack = Slack { edges: 0.01, motions: 0.05 };
 /// As [`NEARLY_CLOSED`], once it has been solved.
-const OVERLAPPING: Slack = Slack { edges: -1.0e-5, motions: 0.1 };
+const OVERLAPPING: Slack = Slack { edges: -1.0e-5, motions: 0.05 };
 /// Residual over forces, and error of contact forces, beyond which a step goes on and is looked at again.
 const FAR_FROM_SOLVED: f64 = 0.1;
 /// Largest factor on A that the guard tries.
