@@ -223,7 +223,8 @@ pub struct SolverSettings {
     pub tolerance: f64,
     /// Contact forces are solved until another look at a contact would change none by more than this fraction of the
     /// largest of them, 1e-12 up to 0.1, or [`contact_iterations`](crate::DeformableParameters::contact_iterations) are
-    /// done. Of bodies that are solved together, as they touch one another or one rigid body that moves, the strictest
+    /// done. Newton's method goes to 1e-3 at least, and leaves the last step's forces as they are where they are within
+    /// a hundred times of this, 1e-6 at the most, so that what stands still keeps its bits. Of bodies that are solved together, as they touch one another or one rigid body that moves, the strictest
     /// counts. Beyond 1e-5 it takes cheaper methods; what it costs and leaves is in `docs/accuracy.md`.
     pub contact_tolerance: f64,
     /// Acceleration.

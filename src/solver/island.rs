@@ -57,10 +57,10 @@ enum Outcome {
 
 /// Contact problems in one iteration.
 const ROUNDS: usize = 4;
-/// How near to touching a contact is taken into the problem before it is solved: of what moves, others will move it too.
-const NEARLY_CLOSED: Slack = Slack { edges: 0.01, motions: 0.05 };
-/// As [`NEARLY_CLOSED`], once it has been solved.
-const OVERLAPPING: Slack = Slack { edges: -1.0e-5, motions: 0.05 };
+/// How near to touching a contact enters the problem before it is solved: of what moves, others will move it too.
+const BEFORE_SOLVE: Slack = Slack { edges: 0.01, motions: 0.05 };
+/// The same after a solve: what overlaps, and of what moves what nearly does.
+const AFTER_SOLVE: Slack = Slack { edges: -1.0e-5, motions: 0.05 };
 /// Residual over forces, and error of contact forces, beyond which a step goes on and is looked at again.
 const FAR_FROM_SOLVED: f64 = 0.1;
 /// Largest factor on A that the guard tries.
@@ -113,7 +113,7 @@ impl Island {
 
     /// Whether the contacts are not far from solved, or the step's iterations over them are spent.
     fn contacts_are_done(&self) -> bool {
-        self.contacts.work.error <= FAR_FROM_SOLVED || self.contacts.work.is_exhausted
+        self.contacts.is_done(FAR_FROM_SOLVED)
     }
 
     /// Bodies whose step is far from solved and would gain energy are rejected: where forces change wildly from iteration
@@ -258,7 +258,7 @@ impl Island {
             floor: (1e-3 * heaviest).max(1e-12),
         };
         for round in 0..ROUNDS {
-            let slack = if round == 0 { NEARLY_CLOSED } else { OVERLAPPING };
+            let slack = if round == 0 { BEFORE_SOLVE } else { AFTER_SOLVE };
             if !self.contacts.activate(&self.bodies, context, slack) && round > 0 {
                 break;
             }

@@ -24,7 +24,7 @@ const WARM_STEPS: usize = 4;
 /// Forces are left as they are at the start if they are no worse than the tolerance times this. A
 /// hundred times more, and a symmetric stack of 1000:1 begins to sway.
 const AS_GOOD: f64 = 100.0;
-/// The same error beyond which they are not: from there on the tolerance itself counts.
+/// Largest error of forces that are left as they are, where the tolerance is below it.
 const GOOD: f64 = 1.0e-6;
 /// Error of a warm start, after the active-set predictor, from which on continuation begins at once.
 const TOO_FAR: f64 = 0.2;
@@ -125,6 +125,7 @@ impl ConeSolver {
                 let relative = if epsilon > EPSILON { STAGE_TOLERANCE } else { tolerance.relative };
                 let tolerance = ConeTolerance { relative: relative.max(tolerance.relative), ..tolerance };
                 let done = solver.minimise(problem, epsilon, steps, tolerance, &mut work);
+                work.error = solver.error(&solver.z, tolerance);
                 solver.center.clone_from(&solver.gamma);
                 solver.predicted.clone_from(&solver.u);
                 done

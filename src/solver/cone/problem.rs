@@ -30,12 +30,14 @@ pub(crate) struct ConeTolerance {
     pub floor: f64,
 }
 
-/// What a solve took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// What a solve took, and left.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ConeWork {
     pub newton_steps: usize,
     pub factorizations: usize,
     pub failures: usize,
+    /// As [`ConeTolerance::relative`]; zero where forces were good as they were.
+    pub error: f64,
 }
 
 impl ConeProblem {

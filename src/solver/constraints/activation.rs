@@ -13,7 +13,7 @@ use crate::solver::body_step::BodyProblem;
 /// How far from touching a contact may end and still enter the problem.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slack {
-    /// In mean edges.
+    /// In mean edges of the bodies; counts only with a soft end.
     pub edges: f64,
     /// In motions of its ends along the normal, over the step.
     pub motions: f64,

@@ -2,7 +2,7 @@
 //! of has changed.
 
 use super::groups::ContactGroups;
-use super::jacobian::{Between, JacobianColumn};
+use super::jacobian::{EndpointJacobian, NodeMotions, Operands};
 use super::lists::{ActiveContact, MatrixPlace};
 use super::rigid_proxy::{RigidProxies, RigidProxy};
 use crate::body::ConstraintGeometry;
@@ -10,13 +10,14 @@ use crate::contact::{Constraint, Endpoint};
 use crate::math::Mat3;
 use crate::solver::body_step::{BodyProblem, Factors};
 use crate::solver::linear::BlockMatrix;
+use std::cell::RefCell;
 
 /// What the last W was made of, and memory for making the next.
 #[derive(Default)]
 pub(crate) struct Delassus {
     made_from: Ingredients,
     fresh: Ingredients,
-    jacobian: Vec<[JacobianColumn; 2]>,
+    jacobian: Vec<[EndpointJacobian; 2]>,
     /// First row of each group, and the number of rows last.
     starts: Vec<usize>,
     before: BlockMatrix,
@@ -30,6 +31,11 @@ pub(crate) struct ContactRows<'a> {
     /// First row of each contact in W, and the number of rows last.
     pub offsets: &'a [usize],
     pub groups: &'a ContactGroups,
+}
+
+thread_local! {
+    /// Memory of each thread that makes blocks.
+    static MOVED: RefCell<[NodeMotions; 2]> = RefCell::default();
 }
 
 /// Rounding of rapier's positions, relative to them: a few units of `f32`.
@@ -75,15 +81,18 @@ impl Delassus {
             std::mem::swap(&mut self.fresh, &mut self.made_from);
             self.jacobian.clear();
             for contact in &*contacts {
-                let jacobian_column = |k: usize| JacobianColumn::new(contact, k, bodies, proxies, h);
-                self.jacobian.push([jacobian_column(0), jacobian_column(1)]);
+                let endpoint_jacobian = |k: usize| EndpointJacobian::new(contact, k, bodies, proxies, h);
+                self.jacobian.push([endpoint_jacobian(0), endpoint_jacobian(1)]);
             }
             std::mem::swap(W, &mut self.before);
             self.starts.clear();
             self.starts.extend(groups.starts.iter().map(|&contact| offsets[contact]));
             W.reset(&self.starts, &groups.coupled);
-            let making = Making { of: self, contacts, groups, between: Between { bodies, factors, proxies } };
-            W.for_each_block(|k, values| making.fill(groups.coupled[k], values));
+            let making =
+                Making { of: self, contacts, groups, operands: Operands { bodies, factors, proxies } };
+            W.for_each_block(|k, values| {
+                MOVED.with_borrow_mut(|moved| making.fill(groups.coupled[k], moved, values));
+            });
         }
         for group in 0..groups.starts.len() - 1 {
             let members = groups.starts[group]..groups.starts[group + 1];
@@ -114,12 +123,12 @@ struct Making<'a> {
     of: &'a Delassus,
     contacts: &'a [ActiveContact],
     groups: &'a ContactGroups,
-    between: Between<'a>,
+    operands: Operands<'a>,
 }
 
 impl Making<'_> {
     /// Fills the block of two groups.
-    fn fill(&self, (gi, gj): (usize, usize), values: &mut [f64]) {
+    fn fill(&self, (gi, gj): (usize, usize), moved: &mut [NodeMotions; 2], values: &mut [f64]) {
         let starts = &self.groups.starts;
         let (rows, columns) =
             (&self.contacts[starts[gi]..starts[gi + 1]], &self.contacts[starts[gj]..starts[gj + 1]]);
@@ -129,12 +138,13 @@ impl Making<'_> {
             // The diagonal's blocks are symmetric.
             let from = if gi == gj { j } else { 0 };
             let column = at.first - self.of.starts[gj];
+            moved.iter_mut().for_each(NodeMotions::begin);
             for (i, on) in rows.iter().enumerate().skip(from) {
                 let row = on.first - self.of.starts[gi];
                 let block =
                     before.as_ref().and_then(|before| before.take(on, at, gi == gj)).unwrap_or_else(|| {
                         let jacobian = &self.of.jacobian;
-                        self.between.contacts(&jacobian[starts[gi] + i], &jacobian[starts[gj] + j])
+                        self.operands.block(&jacobian[starts[gi] + i], &jacobian[starts[gj] + j], moved)
                     });
                 for c in 0..at.constraint.dimension() {
                     for r in 0..on.constraint.dimension() {
@@ -252,8 +262,14 @@ impl Ingredients {
                     Endpoint::Rigid { proxy, .. } | Endpoint::Rotation { proxy } => {
                         self.nodes.push(proxy.0);
                         self.bits.extend(geometry.arms[k].iter());
-                        if let RigidProxy::Rigid { inv_mass, steady_inv_inertia, .. } = proxies.get(*proxy) {
-                            self.bits.extend(inv_mass.iter().chain(steady_inv_inertia));
+                        match proxies.get(*proxy) {
+                            RigidProxy::Rigid { inv_mass, steady_inv_inertia, .. } => {
+                                self.bits.extend(inv_mass.iter().chain(steady_inv_inertia));
+                            }
+                            RigidProxy::Link { articulation, slot, .. } => {
+                                self.nodes.extend([*articulation as u32, *slot as u32]);
+                            }
+                            RigidProxy::Prescribed { .. } => {}
                         }
                     }
                 }

@@ -29,7 +29,8 @@ pub(super) fn target_gap(constraint: &Constraint, bodies: &[BodyProblem], contex
     constraint.gap.max(-limits.recovery_speed * h)
 }
 
-/// The shorter of the mean edges of the bodies that a constraint is between \[m\]; infinite between rigid ones.
+/// The shorter of the mean edges of the bodies that a constraint is between \[m\]; infinite between rigid ones,
+/// all of which enter the problem before its first solve.
 pub(super) fn shorter_edge(constraint: &Constraint, bodies: &[BodyProblem]) -> f64 {
     let edges = constraint.endpoints.iter().map(|endpoint| match endpoint {
         Endpoint::Soft { body, .. } => bodies[*body].model.surface.mean_edge,

@@ -15,11 +15,15 @@ use crate::solver::cone::{ConeTolerance, Effort};
 const CROWD: usize = 6;
 /// Operations of a small island's factorizations in a step, at the most, before sweeps take over: a millisecond or two.
 const LIGHT_WORK: usize = 20_000_000;
-/// The same of what is still, or has rigid loads. A landing takes 1e7; what a thousand times its mass crushes at 1e3 Pa
-/// and 1/10 s takes 1.6e9, and at half of that ends below the floor.
+/// The same of what is still, or overlaps after sweeps.
+const STILL_WORK: [usize; 2] = [100_000_000, 1_000_000_000];
+/// So many solves, between those bounds.
+const STILL_SOLVES: usize = 4;
+/// The same of what has rigid loads. A landing takes 1e7; what a thousand times its mass crushes at 1e3 Pa and 1/10 s
+/// takes 1.6e9, and at half of that ends below the floor.
 const LOADED_WORK: usize = 20_000_000_000;
 /// The same of crowds that are still: some 100 ms.
-const STILL_WORK: usize = 2_000_000_000;
+const STILL_CROWD_WORK: usize = 400_000_000;
 /// Accuracy beyond which sweeps are cheaper than Newton's method: they gain a digit in some ten products with W. At 1e-4 a
 /// sliding cube takes a third of the time and a heap half of it, at the same error; heavy loads stay with Newton's method.
 pub(super) const LOOSE: f64 = 1.0e-5;
@@ -73,8 +77,12 @@ impl ContactSystem {
             return self.improve_without_matrix(bodies, around);
         }
         let (is_still, has_loads) = (self.is_still(bodies, context.h), self.has_loads(context));
-        let work = if is_still || has_loads { LOADED_WORK } else { LIGHT_WORK };
         let solve = SOLVE * self.groups.factor_work();
+        let most = match has_loads {
+            true => LOADED_WORK,
+            false => (STILL_SOLVES * solve).clamp(STILL_WORK[0], STILL_WORK[1]),
+        };
+        let work = if is_still || has_loads { most } else { LIGHT_WORK };
         let sweeps_first = is_loose && !has_loads;
         if is_small && !sweeps_first && self.spent.operations + solve <= work {
             return self.solve_by_newton(bodies, around, Effort::Full).unwrap_or(false);
@@ -90,9 +98,11 @@ impl ContactSystem {
         if sweeps_first && self.work.error <= tolerance.relative {
             return changed;
         }
-        let effort = if is_small && self.spent.operations < LOADED_WORK && self.overlaps(bodies) {
+        let effort = if is_small && self.spent.operations < most && self.overlaps(bodies) {
             Effort::Full
-        } else if is_still && self.work.error <= NEARLY_SOLVED && self.spent.operations + solve <= STILL_WORK
+        } else if is_still
+            && self.work.error <= NEARLY_SOLVED
+            && self.spent.operations + solve <= STILL_CROWD_WORK.min(STILL_SOLVES * solve)
         {
             Effort::Near
         } else {

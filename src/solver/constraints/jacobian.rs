@@ -12,24 +12,10 @@ use nalgebra::Vector6;
 /// What one endpoint of a contact moves, along the contact's directions, with its sign.
 // Most are soft, and boxes would be allocated in every step.
 #[allow(clippy::large_enum_variant)]
-pub(super) enum JacobianColumn {
+pub(super) enum EndpointJacobian {
     /// Fixed or kinematic.
     Idle,
-    Soft {
-        body: usize,
-        count: usize,
-        nodes: [usize; 3],
-        /// Their places on the surface.
-        places: [usize; 3],
-        weights: [f64; 3],
-        form: BlockForm,
-        /// Directions; in the frame of a body that has one frame.
-        directions: Mat3,
-        /// The same in the frames of the nodes, by their weights.
-        turned: [Mat3; 3],
-        /// What deflation makes of them, transposed.
-        deflated: Mat3,
-    },
+    Soft(SoftEndpoint),
     Rigid {
         proxy: ProxyId,
         /// Force and moment per unit along each direction.
@@ -44,7 +30,24 @@ pub(super) enum JacobianColumn {
     },
 }
 
-impl JacobianColumn {
+/// Nodes of a soft body, by their weights.
+pub(super) struct SoftEndpoint {
+    body: usize,
+    count: usize,
+    nodes: [usize; 3],
+    /// Their places on the surface.
+    places: [usize; 3],
+    weights: [f64; 3],
+    form: BlockForm,
+    /// Directions; in the frame of a body that has one frame.
+    directions: Mat3,
+    /// `w_k F_kᵀ D` per node: the directions D in the frame F of the node, by its weight w.
+    turned: [Mat3; 3],
+    /// `Σ w_k U_kᵀ D`, U what deflation adds to the inverse at a node (`Preconditioner::deflated`).
+    deflated: Mat3,
+}
+
+impl EndpointJacobian {
     pub fn new(
         ActiveContact { constraint, geometry, .. }: &ActiveContact,
         k: usize,
@@ -104,112 +107,115 @@ impl JacobianColumn {
             }
             count += 1;
         }
-        Self::Soft { body, count, nodes, places, weights, form, directions, turned, deflated }
+        debug_assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9, "deflation takes them for shares");
+        Self::Soft(SoftEndpoint { body, count, nodes, places, weights, form, directions, turned, deflated })
     }
 }
 
-/// What the Jacobian columns act on.
-pub(super) struct Between<'a> {
+/// What the blocks of W are computed from.
+pub(super) struct Operands<'a> {
     pub bodies: &'a [BodyProblem],
     pub factors: Factors<'a>,
     pub proxies: &'a RigidProxies,
 }
 
-impl Between<'_> {
-    /// The block of W between two contacts.
+/// What an endpoint's directions move of a body with a frame per node, at the nodes that were asked for: where bodies are crushed into one
+/// another, hundreds of contacts ask for the same tens of nodes.
+#[derive(Default)]
+pub(super) struct NodeMotions {
+    endpoint: u32,
+    /// By places on the surface: the endpoint that a motion was computed for.
+    known_for: Vec<u32>,
+    motions: Vec<Mat3>,
+}
+
+impl NodeMotions {
+    /// Begins with another endpoint.
+    pub fn begin(&mut self) {
+        if self.endpoint == u32::MAX {
+            *self = Self::default();
+        }
+        self.endpoint += 1;
+    }
+
     #[inline(always)]
-    pub fn contacts(&self, a: &[JacobianColumn; 2], b: &[JacobianColumn; 2]) -> Mat3 {
+    fn at(&mut self, place: usize, compute: impl FnOnce() -> Mat3) -> &Mat3 {
+        if self.known_for.len() <= place {
+            self.known_for.resize(place + 1, 0);
+            self.motions.resize(place + 1, Mat3::zeros());
+        }
+        if self.known_for[place] != self.endpoint {
+            self.known_for[place] = self.endpoint;
+            self.motions[place] = compute();
+        }
+        &self.motions[place]
+    }
+}
+
+impl Operands<'_> {
+    /// The block of W between two contacts; `moved` by b's endpoints.
+    #[inline(always)]
+    pub fn block(
+        &self,
+        a: &[EndpointJacobian; 2],
+        b: &[EndpointJacobian; 2],
+        moved: &mut [NodeMotions; 2],
+    ) -> Mat3 {
         let mut sum = Mat3::zeros();
         for a in a {
-            for b in b {
-                self.add(a, b, &mut sum);
+            for (b, moved) in b.iter().zip(&mut *moved) {
+                self.add(a, b, moved, &mut sum);
             }
         }
         sum
     }
 
-    /// What two contacts have to do with one another through a soft body.
+    /// What two contacts have to do with one another through the same soft body.
     #[inline(always)]
-    fn of_body(&self, index: usize, a: &JacobianColumn, b: &JacobianColumn) -> Mat3 {
-        let (
-            JacobianColumn::Soft { count: m, weights, form, directions, turned, deflated, .. },
-            JacobianColumn::Soft {
-                count: n,
-                weights: weights_b,
-                directions: directions_b,
-                turned: turned_b,
-                deflated: deflated_b,
-                ..
-            },
-        ) = (a, b)
-        else {
-            return Mat3::zeros();
+    fn of_body(&self, a: &SoftEndpoint, b: &SoftEndpoint, moved: &mut NodeMotions) -> Mat3 {
+        let body = &self.bodies[a.body];
+        let (factor, preconditioner) = (self.factors.of(a.body, body), &body.preconditioner);
+        let inverse = |k: usize, l: usize| {
+            preconditioner.inverse_block(factor, [a.places[k], b.places[l]], [a.nodes[k], b.nodes[l]])
         };
         let mut sum = Mat3::zeros();
-        if *form == BlockForm::NodeFrames {
-            for k in 0..*m {
-                let mut moved = Mat3::zeros();
-                for l in 0..*n {
-                    moved += self.inverse_block(index, [a, b], [k, l]) * turned_b[l];
-                }
-                sum += turned[k].tr_mul(&moved);
+        if a.form == BlockForm::NodeFrames {
+            for k in 0..a.count {
+                let motion = || (0..b.count).map(|l| inverse(k, l) * b.turned[l]).sum();
+                sum += a.turned[k].tr_mul(moved.at(a.places[k], motion));
             }
             // Weights add up to one.
-            return sum + deflated.tr_mul(directions_b) + directions.tr_mul(deflated_b);
+            return sum + a.deflated.tr_mul(&b.directions) + a.directions.tr_mul(&b.deflated);
         }
-        for k in 0..*m {
-            for l in 0..*n {
-                sum += self.block(index, [a, b], [k, l]) * (weights[k] * weights_b[l]);
+        for k in 0..a.count {
+            for l in 0..b.count {
+                let mut block = inverse(k, l);
+                if a.form == BlockForm::Other {
+                    block = preconditioner.compliance(factor, &block, a.nodes[k], b.nodes[l]);
+                }
+                sum += block * (a.weights[k] * b.weights[l]);
             }
         }
-        directions.tr_mul(&(sum * directions_b))
-    }
-
-    /// Between node `k` of one column and `l` of another, in the frame of the matrix.
-    #[inline(always)]
-    fn inverse_block(&self, index: usize, columns: [&JacobianColumn; 2], [k, l]: [usize; 2]) -> Mat3 {
-        let [JacobianColumn::Soft { nodes, places, .. }, JacobianColumn::Soft { nodes: on, places: at, .. }] =
-            columns
-        else {
-            return Mat3::zeros();
-        };
-        let body = &self.bodies[index];
-        body.preconditioner.inverse_block(self.factors.of(index, body), [places[k], at[l]], [nodes[k], on[l]])
-    }
-
-    /// The same of P, but for its one frame.
-    #[inline(always)]
-    fn block(&self, index: usize, columns: [&JacobianColumn; 2], ends: [usize; 2]) -> Mat3 {
-        let inverse = self.inverse_block(index, columns, ends);
-        let [JacobianColumn::Soft { nodes, form, .. }, JacobianColumn::Soft { nodes: on, .. }] = columns
-        else {
-            return inverse;
-        };
-        if *form != BlockForm::Other {
-            return inverse;
-        }
-        let body = &self.bodies[index];
-        let factor = self.factors.of(index, body);
-        body.preconditioner.compliance(factor, &inverse, nodes[ends[0]], on[ends[1]])
+        a.directions.tr_mul(&(sum * b.directions))
     }
 
     #[inline(always)]
-    fn add(&self, a: &JacobianColumn, b: &JacobianColumn, sum: &mut Mat3) {
+    fn add(&self, a: &EndpointJacobian, b: &EndpointJacobian, moved: &mut NodeMotions, sum: &mut Mat3) {
         match (a, b) {
-            (JacobianColumn::Soft { body: i, .. }, JacobianColumn::Soft { body: j, .. }) if i == j => {
-                *sum += self.of_body(*i, a, b);
+            (EndpointJacobian::Soft(a), EndpointJacobian::Soft(b)) if a.body == b.body => {
+                *sum += self.of_body(a, b, moved);
             }
             (
-                JacobianColumn::Rigid { proxy: i, wrenches, .. },
-                JacobianColumn::Rigid { proxy: j, motions, .. },
+                EndpointJacobian::Rigid { proxy: i, wrenches, .. },
+                EndpointJacobian::Rigid { proxy: j, motions, .. },
             ) if i == j => {
                 *sum += Mat3::from_fn(|r, c| {
                     wrenches[r][0].dot(&motions[c][0]) + wrenches[r][1].dot(&motions[c][1])
                 });
             }
             (
-                JacobianColumn::Link { articulation, slot, wrenches },
-                JacobianColumn::Link { articulation: other, slot: from, wrenches: acting },
+                EndpointJacobian::Link { articulation, slot, wrenches },
+                EndpointJacobian::Link { articulation: other, slot: from, wrenches: acting },
             ) if articulation == other => {
                 let Articulation { links, blocks } = &self.proxies.articulations[*articulation];
                 let moved = acting.map(|w| blocks[slot * links.len() + from] * w);

@@ -14,7 +14,8 @@ pub(crate) struct ActiveContact {
     pub first: usize,
     /// De Saxcé shift \[m\].
     pub shift: f64,
-    /// Where the W that was made last has it.
+    /// Where the W that was made last has it. Within a step, in which rigid bodies and h stay as they are: contacts
+    /// are listed anew in the next.
     pub in_matrix: Option<MatrixPlace>,
 }
 

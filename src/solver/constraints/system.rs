@@ -101,7 +101,7 @@ pub(crate) struct ContactWork {
     pub failures: usize,
     pub sweeps: usize,
     pub products: usize,
-    /// The budget is gone.
+    /// The budget was gone, once; what follows within the step is brief.
     pub is_exhausted: bool,
     /// Of the last solve, relative to the largest force.
     pub error: f64,
@@ -134,6 +134,11 @@ impl ContactSystem {
     /// What follows may take as much as a step.
     pub fn renew_budget(&mut self) {
         self.spent = Spent::default();
+    }
+
+    /// Whether the contacts are not far from solved, or what they may take is spent.
+    pub fn is_done(&self, far: f64) -> bool {
+        self.work.error <= far || self.work.is_exhausted
     }
 
     /// Takes note of what has changed.
@@ -174,7 +179,6 @@ impl ContactSystem {
         let is_rigid = |endpoint: &Endpoint| !matches!(endpoint, Endpoint::Soft { .. });
         for contact in &mut self.active {
             keep_together(&mut contact.constraint, index);
-            contact.in_matrix = None;
             let endpoints = &contact.constraint.endpoints;
             if endpoints.iter().any(|endpoint| endpoint.is_of(index)) || endpoints.iter().all(is_rigid) {
                 self.lambda[contact.rows()].fill(0.0);

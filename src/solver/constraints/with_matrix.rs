@@ -82,6 +82,7 @@ impl ContactSystem {
             self.work.newton_steps += done.newton_steps;
             self.work.factorizations += done.factorizations;
             self.work.failures += done.failures;
+            self.work.error = done.error;
             self.spent.operations += done.factorizations * self.groups.factor_work();
             if done.failures > 0 && effort != Effort::Full {
                 self.lambda.clone_from(&self.before);
@@ -94,7 +95,6 @@ impl ContactSystem {
             self.gaps.extend(dense.g_free.iter().zip(&dense.slips).map(|(gap, slip)| gap + slip));
             self.update_shifts(1.0);
         }
-        self.work.error = 0.0;
         Some(self.move_bodies(bodies, around))
     }
 
@@ -125,8 +125,9 @@ impl ContactSystem {
         let changed = self.before != self.lambda;
         if changed {
             self.scatter_changes(bodies);
-            let large = are_large(bodies);
-            for_each_item(bodies, large, |index, body| body.contact_step(around.factors.of(index, body)));
+            for_each_item(bodies, are_large(bodies), |index, body| {
+                body.contact_step(around.factors.of(index, body))
+            });
         }
         changed
     }
