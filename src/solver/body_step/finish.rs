@@ -9,10 +9,6 @@ const MAX_BALANCING_TURN: f64 = 0.1;
 /// Largest rotation \[rad\] in a step that [`BodyProblem::final_velocities`] gives back.
 const MAX_SPIN_GIVEN: f64 = 0.5;
 
-/// Part of the spin [1/s] whose loss is not worth giving back to what touches: what lies still keeps its bits. Without it a
-/// pile of twenty rocks for 5.9 s, not 4.
-const NEGLIGIBLE_LOSS: f64 = 0.02;
-
 impl BodyProblem {
     /// Moves and turns a free body as a rigid one, so that its residual has neither force nor
     /// moment: what is left of it after a few iterations would set the body spinning. Deforms nothing.
@@ -33,79 +29,32 @@ impl BodyProblem {
     }
 
     /// Velocities at the end of the step [m/s]; `in_flight` tells that nothing touched the body or was attached to it. Implicit
-    /// Euler loses angular momentum that nothing has taken: a rotation about the centre of mass puts it back.
+    /// Euler then loses angular momentum that nothing has taken: a rotation about the centre of mass puts
+    /// it back.
     pub fn final_velocities(&self, in_flight: bool, v: &mut Vec<Vec3>) {
         v.clear();
         v.extend(self.current.x.iter().zip(&self.x_start).map(|(new, old)| (new - old) / self.h));
-        if !(self.settings.keeps_spin && self.key.pins.is_empty()) || self.is_rejected {
+        if !(in_flight && self.settings.keeps_spin && self.key.pins.is_empty()) {
             return;
         }
         let (_, centre) = centre_of_mass(&self.current.x, &self.masses);
-        let inertia = inertia_about(&centre, &self.current.x, &self.masses);
-        let missing =
-            if in_flight { self.missing_momentum(&centre, v) } else { self.missing_in_contact(&centre, v) };
-        let turn = solve_semidefinite(&inertia, &missing);
-        if !(turn.norm() * self.h < MAX_SPIN_GIVEN) {
-            return;
-        }
-        let share =
-            if in_flight { 1.0 } else { self.share_without_gain(v, &(inertia * turn), &turn, &centre) };
-        for (v, x) in v.iter_mut().zip(&self.current.x) {
-            *v += turn.cross(&(x - centre)) * share;
-        }
-    }
-
-    /// Angular momentum [kg m²/s] that the body should have by the moments on it and has not, with these velocities.
-    fn missing_momentum(&self, centre: &Vec3, v: &[Vec3]) -> Vec3 {
         let inertial = |i: usize| self.target[i] - self.x_start[i] - self.v_start[i] * self.h;
         let (mut gained, mut lost) = (Vec3::zeros(), Vec3::zeros());
         for (i, m) in self.masses.iter().enumerate() {
             let arm = self.current.x[i] - centre;
             // External forces act where the nodes are at the end of the step, as in the step itself.
             gained += arm.cross(&inertial(i)) * (*m / (self.h * self.h) * self.dt);
-            gained += arm.cross(&self.contact_force[i]) * self.dt;
             lost += arm.cross(&v[i]) * *m;
         }
         let drag = 1.0 + self.material.mass_damping * self.dt;
-        (self.spin + gained) / drag - lost
-    }
-
-    /// The same of what touches, but for the remainder of an iteration that has not converged, as in an impact; nothing
-    /// of what turns so slowly that only remainders would be given, in every step.
-    fn missing_in_contact(&self, centre: &Vec3, v: &[Vec3]) -> Vec3 {
-        let lost = self.lost_by_turning(centre);
-        let inertia = inertia_about(centre, &self.current.x, &self.masses);
-        let [lost_turn, turn] =
-            [&lost, &self.spin].map(|momentum| solve_semidefinite(&inertia, momentum).norm());
-        if !(lost_turn > NEGLIGIBLE_LOSS * self.h * turn) {
-            return Vec3::zeros();
+        let missing = (self.spin + gained) / drag - lost;
+        let inertia = inertia_about(&centre, &self.current.x, &self.masses);
+        let turn = solve_semidefinite(&inertia, &missing);
+        if turn.norm() * self.h < MAX_SPIN_GIVEN {
+            for (v, x) in v.iter_mut().zip(&self.current.x) {
+                *v += turn.cross(&(x - centre));
+            }
         }
-        let has_converged = self.residual() <= self.settings.tolerance * self.force_scale();
-        if has_converged { self.missing_momentum(centre, v) } else { lost }
-    }
-
-    /// Angular momentum [kg m²/s] that implicit Euler loses as the nodes turn on, whatever acts on them.
-    fn lost_by_turning(&self, centre: &Vec3) -> Vec3 {
-        let (_, before) = centre_of_mass(&self.x_start, &self.masses);
-        let mut missing = Vec3::zeros();
-        for (i, m) in self.masses.iter().enumerate() {
-            let moved = (self.x_start[i] - before) - (self.current.x[i] - centre);
-            missing += moved.cross(&self.v_start[i]) * *m;
-        }
-        missing
-    }
-
-    /// How much of a turn may be given: no more energy than implicit Euler takes from what only rotates, `Σ m |v − v⁰|²`,
-    /// half of it as such and half by the chords that nodes go on against what holds them together. With twice as much a
-    /// block that spins on a floor gains 2e-3 of its energy in a second.
-    fn share_without_gain(&self, v: &[Vec3], momentum: &Vec3, turn: &Vec3, centre: &Vec3) -> f64 {
-        let (mut lost, mut spin) = (0.0, Vec3::zeros());
-        for (i, m) in self.masses.iter().enumerate() {
-            lost += m * (v[i] - self.v_start[i]).norm_squared();
-            spin += (self.current.x[i] - centre).cross(&v[i]) * *m;
-        }
-        let given = turn.dot(&spin) + 0.5 * turn.dot(momentum);
-        if given <= lost { 1.0 } else { lost / given }
     }
 
     /// What the iteration has left of the forces on free nodes \[N\], per pinned node: the pins carry it too, so
