@@ -91,7 +91,9 @@ impl Island {
             let done = match outcome {
                 Outcome::Stalled => true,
                 Outcome::Turned => false,
-                Outcome::Descended => self.contacts_are_done() && self.bodies.iter().all(converged),
+                Outcome::Descended => {
+                    self.contacts.is_done(FAR_FROM_SOLVED) && self.bodies.iter().all(converged)
+                }
             };
             if done {
                 break;
@@ -109,11 +111,6 @@ impl Island {
             self.reject_steps_that_gain_energy(context);
         }
         self.bodies.iter().for_each(|b| self.report.counters.add(&b.preconditioner.counters));
-    }
-
-    /// Whether the contacts are not far from solved, or the step's iterations over them are spent.
-    fn contacts_are_done(&self) -> bool {
-        self.contacts.is_done(FAR_FROM_SOLVED)
     }
 
     /// Bodies whose step is far from solved and would gain energy are rejected: where forces change wildly from iteration
