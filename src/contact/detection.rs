@@ -108,7 +108,12 @@ impl Detector {
             self.list_near(surface);
             self.detect_rims(&scene, constraints);
             self.detect_corners(&scene, constraints);
-            self.keep_points(&scene, memory, constraints);
+            self.points.clear();
+            if kind.is_faceted {
+                self.keep_edges(&scene, memory, constraints);
+            } else {
+                self.keep_points(&scene, memory, constraints);
+            }
             self.detect_triangles(&scene, constraints);
             self.detect_segments(&scene, constraints);
         }

@@ -2,6 +2,7 @@
 
 use super::constraint::{Constraint, Endpoint, Law};
 use super::obstacle::Obstacle;
+use super::shape_table::Corners;
 use super::surface_point::{Scales, SurfacePoint};
 use crate::body::{ConstraintKey, Feature, ObstacleContact};
 use crate::fem::DeformableModel;
@@ -46,12 +47,21 @@ impl<'a> PairScene<'a> {
         let moves = obstacle.start != obstacle.end;
         let motion = |(n, p): (&u32, &Vec3)| obstacle.displacement(&x[*n as usize], p).norm_squared();
         let motions = surface.nodes.iter().zip(local).map(motion);
+        let extent = obstacle.shape.compute_local_aabb();
+        let farthest = from_real(extent.mins).abs().sup(&from_real(extent.maxs).abs()).max();
+        // Boxes clamp the point: nothing but its own coordinates is rounded.
+        let is_box = matches!(obstacle.traits().corners, Corners::Box(_));
+        let scales = Scales {
+            band: BAND * model.size,
+            shift: SHIFT * surface.mean_edge,
+            extent: if is_box { 0.0 } else { farthest },
+        };
         Self {
             pair,
             obstacle,
             model,
-            extent: obstacle.shape.compute_local_aabb(),
-            scales: Scales { band: BAND * model.size, shift: SHIFT * surface.mean_edge },
+            extent,
+            scales,
             motion: if moves { motions.fold(0.0, f64::max).sqrt() } else { 0.0 },
         }
     }

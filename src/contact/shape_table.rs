@@ -29,7 +29,8 @@ pub(crate) enum Corners<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ShapeKind {
     pub solidity: Solidity,
-    /// Made of plane faces: nodes, rims and corners carry what lies on it, one contact per feature of the body.
+    /// Made of plane faces or straight lines: nodes, rims and corners carry what lies on it, one contact per feature of the
+    /// body.
     pub is_faceted: bool,
     /// A plane without edges: its contacts with a body are all at nodes.
     pub is_plane: bool,
@@ -62,7 +63,7 @@ pub(crate) fn shape_traits(shape: &SharedShape) -> ShapeTraits<'_> {
         ShapeTraits { kind, corners, ..plain }
     };
     let thin = |corners| {
-        let kind = ShapeKind { solidity: Sheet, ..curved };
+        let kind = ShapeKind { solidity: Sheet, is_faceted: true, ..curved };
         ShapeTraits { kind, corners, ..plain }
     };
     match shape.as_typed_shape() {

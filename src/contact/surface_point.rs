@@ -30,12 +30,25 @@ pub(crate) struct Scales {
     pub band: f64,
     /// Shift back into the body for the second projection \[m\].
     pub shift: f64,
+    /// Largest coordinate of what parry projects onto, beside that of the point itself \[m\]: its `f32` rounds by
+    /// 6e-8 of it.
+    pub extent: f64,
 }
 
 /// Sine below which a direction counts as a normal: f32 places of a metre, seen from a shift of millimetres, give 1e-5.
 const STRAIGHT: f64 = 1.0e-4;
 /// Cosine beyond which a normal counts as facing the body's surface.
 const FACING: f64 = -0.1;
+
+/// Cosine beyond which a normal leads out of the body: the node has passed a sheet's face.
+const PASSED_FACE: f64 = 0.3;
+/// The same of a sheet's border or a wire. One beside a node of a right-angled edge, flush with one of its faces, is at
+/// 0.71; at 0.3 such nodes took turns to be inside and outside.
+const PASSED_LINE: f64 = 0.75;
+/// Part of the largest coordinate by which a projection straight down may be beside: `f32` keeps 6e-8, a few of those.
+/// Where only the point's own coordinate counted, 1 cm from the middle of a 2 m sheet a face ended anywhere, and five of
+/// 24 cubes on the sheet's border swayed.
+const PROJECTED: f64 = 3.0e-7;
 
 /// Projects `p` (in the obstacle's frame) onto the obstacle. `outward` is the unit normal of the
 /// body's own surface at `p`, in that frame too. `None` where parry finds nothing, as for
@@ -59,7 +72,8 @@ pub(crate) fn surface_point(
             (false, face) => face_or(hit.direction?, face),
         };
         // Just behind a sheet, seen from the body: the node has passed and is to come back.
-        let behind = hit.distance < scales.shift && normal.dot(outward) > 0.3;
+        let passed = if hit.face.is_some() { PASSED_FACE } else { PASSED_LINE };
+        let behind = hit.distance < scales.shift && normal.dot(outward) > passed;
         if behind || (near && !faces_body(&normal)) {
             normal = -normal;
         }
@@ -107,8 +121,7 @@ pub(crate) fn is_over_face(obstacle: &Obstacle, on_face: &SurfacePoint, p: &Vec3
     };
     let offset = lifted - hit.point;
     let beside = offset - on_face.normal * on_face.normal.dot(&offset);
-    // f32 keeps 6e-8 of a coordinate; a few of those.
-    !hit.inside && beside.norm() <= 3e-7 * lifted.norm()
+    !hit.inside && beside.norm() <= PROJECTED * lifted.norm().max(scales.extent)
 }
 
 /// In `f64` throughout.
@@ -207,7 +220,7 @@ mod tests {
         Obstacle::new((ProxyId(0), 0, 0), shape, [start, start])
     }
 
-    const SCALES: Scales = Scales { band: 4e-5, shift: 0.01 };
+    const SCALES: Scales = Scales { band: 4e-5, shift: 0.01, extent: 0.0 };
 
     #[test]
     fn normal_is_one_and_continuous_through_the_surface_of_every_solid_shape() {

@@ -10,7 +10,7 @@ use super::surface_point::{Scales, SurfacePoint, foot};
 use crate::math::{Vec3, from_real, to_real};
 use parry3d::math::Pose;
 use parry3d::query::{ClosestPoints, closest_points};
-use parry3d::shape::Triangle;
+use parry3d::shape::{Segment, Shape, Triangle};
 
 /// A contact inside a triangle, in the obstacle's frame.
 #[derive(Clone, Copy, Debug)]
@@ -39,34 +39,90 @@ pub(crate) fn triangle_point<'a>(
     reach: f64,
     scales: &Scales,
 ) -> Option<TrianglePoint> {
-    let outward = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).try_normalize(0.0)?;
-    let back = corners.map(|c| c - outward * scales.shift);
-    let [a, b, c] = back.each_ref().map(to_real);
-    let far = (reach + scales.shift) as f32;
-    let identity = Pose::IDENTITY;
-    let found = closest_points(&identity, &Triangle::new(a, b, c), &identity, &*obstacle.shape, far);
-    let Ok(ClosestPoints::WithinMargin(on_triangle, on_obstacle)) = found else {
-        return None;
-    };
-    let (on_triangle, point) = (from_real(on_triangle), from_real(on_obstacle));
-    let weights = snapped(barycentric(&back, &on_triangle)?);
-    if weights.iter().filter(|w| **w > 0.0).count() < 2 {
-        return None;
-    }
-    let here = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
+    let shifted = Shifted::new(corners, scales)?;
+    let [a, b, c] = shifted.corners.each_ref().map(to_real);
+    let [on_triangle, point] = Shifted::closest(obstacle, &Triangle::new(a, b, c), reach, scales)?;
+    let weights = snapped(barycentric(&shifted.corners, &on_triangle)?)?;
+    let here = at(corners, &weights);
     let contact_at = |point: Vec3| {
-        let normal = (on_triangle - point).try_normalize(scales.band)?;
-        let gap = normal.dot(&(here - point));
-        let parallel = known.clone().filter(|k| k.normal.dot(&normal) > PARALLEL);
+        let surface = shifted.surface_point(&on_triangle, &here, point, scales)?;
+        let parallel = known.clone().filter(|k| k.normal.dot(&surface.normal) > PARALLEL);
         let said = parallel.map(|k| k.gap).fold(f64::INFINITY, f64::min);
-        let is_new = gap < reach && gap < said - scales.band && normal.dot(&outward) <= FACING;
-        is_new.then_some(SurfacePoint { point, normal, gap, flat: false })
+        (surface.gap < reach && surface.gap < said - scales.band).then_some(surface)
     };
     let found = contact_at(point)?;
     let distance = (on_triangle - point).norm();
     let nearer = foot(obstacle, &on_triangle).filter(|f| (on_triangle - f).norm() < NEARER * distance);
     let surface = nearer.map_or(Some(found), contact_at)?;
     Some(TrianglePoint { weights, surface })
+}
+
+/// As [`triangle_point`], on the edge opposite a corner alone. Shifted along the triangle's normal, an edge is nearest to a
+/// line at another place than where it crosses it, and next to a parallel line anywhere (24 mm to and fro on a polyline);
+/// shifted along the direction across both, it is nearest where it crosses.
+pub(crate) fn edge_point(
+    obstacle: &Obstacle,
+    corners: &[Vec3; 3],
+    opposite: usize,
+    reach: f64,
+    scales: &Scales,
+) -> Option<TrianglePoint> {
+    let nearest = |shifted: &Shifted| {
+        let [a, b] = [1, 2].map(|k| to_real(&shifted.corners[(opposite + k) % 3]));
+        Shifted::closest(obstacle, &Segment::new(a, b), reach, scales)
+    };
+    let mut shifted = Shifted::new(corners, scales)?;
+    let [on_edge, point] = nearest(&shifted)?;
+    let across = (on_edge - point).try_normalize(scales.band)?;
+    shifted.corners = corners.map(|c| c + across * scales.shift);
+    let [on_edge, point] = nearest(&shifted)?;
+    let mut weights = barycentric(&shifted.corners, &on_edge)?;
+    weights[opposite] = 0.0;
+    let weights = snapped(weights)?;
+    let surface = shifted.surface_point(&on_edge, &at(corners, &weights), point, scales)?;
+    (surface.gap < reach).then_some(TrianglePoint { weights, surface })
+}
+
+/// A triangle shifted back into its body.
+struct Shifted {
+    corners: [Vec3; 3],
+    outward: Vec3,
+}
+
+impl Shifted {
+    fn new(corners: &[Vec3; 3], scales: &Scales) -> Option<Self> {
+        let outward = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).try_normalize(0.0)?;
+        Some(Self { corners: corners.map(|c| c - outward * scales.shift), outward })
+    }
+
+    /// The closest points of a part of the triangle and the obstacle.
+    fn closest(obstacle: &Obstacle, part: &dyn Shape, reach: f64, scales: &Scales) -> Option<[Vec3; 2]> {
+        let far = (reach + scales.shift) as f32;
+        let identity = Pose::IDENTITY;
+        let found = closest_points(&identity, part, &identity, &*obstacle.shape, far);
+        let Ok(ClosestPoints::WithinMargin(on_part, on_obstacle)) = found else {
+            return None;
+        };
+        Some([on_part, on_obstacle].map(from_real))
+    }
+
+    /// The contact of a point of the triangle, `shifted` and as it is `here`, with one of the obstacle; `None` if they are
+    /// too close to tell a direction, or it is at the triangle's back.
+    fn surface_point(
+        &self,
+        shifted: &Vec3,
+        here: &Vec3,
+        point: Vec3,
+        scales: &Scales,
+    ) -> Option<SurfacePoint> {
+        let normal = (shifted - point).try_normalize(scales.band)?;
+        let gap = normal.dot(&(here - point));
+        (normal.dot(&self.outward) <= FACING).then_some(SurfacePoint { point, normal, gap, flat: false })
+    }
+}
+
+fn at(corners: &[Vec3; 3], weights: &[f64; 3]) -> Vec3 {
+    corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
 }
 
 /// Weights of the corners at the foot of `p` in the plane of a triangle.
@@ -82,8 +138,9 @@ pub(crate) fn barycentric([a, b, c]: &[Vec3; 3], p: &Vec3) -> Option<[f64; 3]> {
     })
 }
 
-fn snapped(weights: [f64; 3]) -> [f64; 3] {
+/// `None` at a corner: its own contact serves.
+fn snapped(weights: [f64; 3]) -> Option<[f64; 3]> {
     let kept = weights.map(|w| if w < CORNER { 0.0 } else { w });
     let sum: f64 = kept.iter().sum();
-    kept.map(|w| w / sum)
+    (kept.iter().filter(|w| **w > 0.0).count() >= 2).then(|| kept.map(|w| w / sum))
 }
