@@ -179,3 +179,79 @@ fn bodies_attached_to_one_another_wake_together() {
     world.step(&mut physics);
     assert!([held, middle, far].iter().all(|h| !world.bodies[*h].is_sleeping()));
 }
+
+/// Does something to the sleeping cube that takes it from under its load, or may; how far the load has come down two
+/// seconds later, and whether it woke.
+fn after(change: impl FnOnce(&mut DeformableWorld, DeformableBodyHandle)) -> (f32, bool) {
+    let mut scene = asleep();
+    let before = scene.physics.bodies[scene.load].translation().y;
+    change(&mut scene.world, scene.soft);
+    scene.step();
+    let woke = !scene.physics.bodies[scene.load].is_sleeping();
+    for _ in 0..120 {
+        scene.step();
+    }
+    (before - scene.physics.bodies[scene.load].translation().y, woke)
+}
+
+/// The load hung in the air where its cube had been.
+#[test]
+fn what_a_sleeping_body_carried_falls_when_that_goes() {
+    let by = |x: f32| Pose::from_translation(Vector::X * x);
+    type Change = fn(&mut DeformableWorld, DeformableBodyHandle, Pose);
+    let changes: [(&str, Change); 5] = [
+        ("removed", |world, soft, _| drop(world.bodies.remove(soft))),
+        ("disabled", |world, soft, _| world.bodies[soft].set_enabled(false)),
+        ("teleported", |world, soft, by| world.bodies[soft].teleport(by).unwrap()),
+        ("other groups", |world, soft, _| {
+            let nothing = InteractionGroups::new(Group::NONE, Group::NONE, InteractionTestMode::And);
+            world.bodies[soft].set_collision_groups(nothing);
+        }),
+        ("led away", |world, soft, by| {
+            let body = &mut world.bodies[soft];
+            for v in 0..body.vertex_count() {
+                let [x, y, z] = body.position(v).unwrap();
+                body.set_position(v, [x + f64::from(by.translation.x), y, z]).unwrap();
+                body.pin(v).unwrap();
+            }
+        }),
+    ];
+    for (name, change) in changes {
+        let (fell, woke) = after(|world, soft| change(world, soft, by(2.0)));
+        println!("{name}: the load fell by {fell:.4} m");
+        assert!(woke, "{name}: the load sleeps");
+        // From the top of the cube to the floor.
+        assert!((fell - 0.4).abs() < 0.01, "{name}: the load fell by {fell} m");
+    }
+    // What is pushed a little keeps it.
+    let (fell, woke) = after(|world, soft| world.bodies[soft].apply_impulse(&[0], Vector::X * 0.01).unwrap());
+    assert!(woke && fell.abs() < 1e-3, "pushed: {woke}, {fell}");
+}
+
+/// Where two cubes lie on one another and one is taken away, what lies on the other wakes too.
+#[test]
+fn what_lies_on_a_body_wakes_when_the_one_below_goes() {
+    let mut physics = PhysicsWorld::new();
+    physics.insert(
+        RigidBodyBuilder::fixed().translation(Vector::Y * -0.5),
+        ColliderBuilder::cuboid(5.0, 0.5, 5.0).friction(0.5),
+    );
+    let shape = ColliderBuilder::cuboid(0.1, 0.1, 0.1).density(500.0).friction(0.5);
+    let (load, _) = physics.insert(RigidBodyBuilder::dynamic().translation(Vector::Y * 0.91), shape);
+    let mut world = DeformableWorld::new();
+    let material = DeformableMaterial::new(1e6, 0.3).stiffness_damping(0.01).friction(0.5);
+    let mut at = |y: f32| {
+        let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [3, 3, 3]).material(material);
+        world.insert(cube.translation(Vector::Y * y)).unwrap()
+    };
+    let [lower, upper] = [0.2, 0.601].map(&mut at);
+    for _ in 0..300 {
+        world.step(&mut physics);
+    }
+    assert!(world.bodies[upper].is_sleeping() && physics.bodies[load].is_sleeping());
+    world.bodies.remove(lower).unwrap();
+    for _ in 0..120 {
+        world.step(&mut physics);
+    }
+    assert!((physics.bodies[load].translation().y - 0.5).abs() < 0.01);
+}

@@ -7,6 +7,7 @@ use super::handle::{DeformableAttachmentHandle, DeformableBodyHandle};
 use crate::error::DeformableBodyError;
 use crate::math::Vec3;
 use rapier3d::data::arena::Arena;
+use rapier3d::dynamics::RigidBodyHandle;
 use std::collections::BTreeMap;
 use std::ops::{Index as At, IndexMut as AtMut};
 
@@ -16,6 +17,8 @@ pub struct DeformableBodySet {
     bodies: Arena<DeformableBody>,
     attachments: BTreeMap<DeformableAttachmentHandle, DeformableAttachment>,
     attached: u64,
+    /// Rigid bodies that slept with bodies that were removed, for the next step to wake.
+    released: Vec<RigidBodyHandle>,
 }
 
 impl DeformableBodySet {
@@ -97,9 +100,20 @@ impl DeformableBodySet {
     /// # Errors
     /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody).
     pub fn remove(&mut self, handle: DeformableBodyHandle) -> Result<DeformableBody, DeformableBodyError> {
-        let body = self.bodies.remove(handle.0);
+        let mut body = self.bodies.remove(handle.0).ok_or_else(|| handle.no_such_body())?;
         self.attachments.retain(|_, attachment| !attachment.involves(handle));
-        body.ok_or_else(|| handle.no_such_body().into())
+        body.wake_up();
+        self.released.append(&mut body.state.sleep.released);
+        Ok(body)
+    }
+
+    /// Takes the rigid bodies that slept with deformable ones that do so no more.
+    pub(crate) fn take_released(&mut self) -> Vec<RigidBodyHandle> {
+        let mut released = std::mem::take(&mut self.released);
+        for (_, body) in self.bodies.iter_mut() {
+            released.append(&mut body.state.sleep.released);
+        }
+        released
     }
 
     /// The body of a handle.

@@ -16,9 +16,11 @@ impl DeformableBody {
         self.state.sleep.surroundings.is_some()
     }
 
-    /// Wakes the body, or keeps it awake for another half second.
+    /// Wakes the body, or keeps it awake for another half second; the next step wakes the rigid bodies that slept with it.
     pub fn wake_up(&mut self) {
-        self.state.sleep = Sleep::default();
+        let Sleep { surroundings, mut released, .. } = std::mem::take(&mut self.state.sleep);
+        released.extend(surroundings.into_iter().flat_map(|around| around.rigid));
+        self.state.sleep.released = released;
     }
 
     /// Whether the body may fall asleep.

@@ -4,6 +4,7 @@ use super::constraint_memory::{ConstraintKey, ConstraintMemory};
 use super::factor_base::FactorBase;
 use super::handle::DeformableBodyHandle;
 use crate::math::{Pose64, Vec3};
+use rapier3d::dynamics::RigidBodyHandle;
 
 /// What the motion of a body changes: what a snapshot has to hold beside the user's own settings (pins,
 /// forces, material). A body restored from it goes on with the same bits.
@@ -46,6 +47,9 @@ pub(crate) struct Sleep {
     /// Time \[s\] for which the body has been still.
     pub still_for: f64,
     pub surroundings: Option<Surroundings>,
+    /// Rigid bodies that slept on a body that does so no more, for the next step to wake: what it carried may have nothing
+    /// below it.
+    pub released: Vec<RigidBodyHandle>,
 }
 
 /// What was around a body when it fell asleep: whatever differs wakes it.
@@ -56,6 +60,8 @@ pub(crate) struct Surroundings {
     /// The next of the bodies that fell asleep together, because they touched, in a ring.
     pub mate: Option<DeformableBodyHandle>,
     pub gravity: Vec3,
+    /// Rigid bodies that fell asleep with it.
+    pub rigid: Vec<RigidBodyHandle>,
 }
 
 impl Surroundings {

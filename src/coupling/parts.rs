@@ -54,6 +54,15 @@ impl fmt::Debug for PhysicsParts<'_> {
 }
 
 impl PhysicsParts<'_> {
+    /// Wakes rigid bodies, those of them that are still there.
+    pub(crate) fn wake(&mut self, handles: &[RigidBodyHandle]) {
+        for handle in handles {
+            if let Some(body) = self.bodies.get_mut(*handle) {
+                body.wake_up(true);
+            }
+        }
+    }
+
     /// For reading.
     pub(crate) fn sets(&self) -> RapierSets<'_> {
         RapierSets {

@@ -65,8 +65,6 @@ const AFTER_SOLVE: Slack = Slack { edges: -1.0e-5, motions: 0.05 };
 const FAR_FROM_SOLVED: f64 = 0.1;
 /// Largest factor on A that the guard tries.
 const MAX_STEP_DAMPING: f64 = 1024.0;
-/// Residual relative to the forces that is rounding and nothing else: sums of some tens of terms.
-pub(crate) const ROUNDING: f64 = 1.0e-12;
 
 impl Island {
     /// Does the iterations of a step of `h` \[s\]; results are in the bodies' `current` and in the
@@ -82,17 +80,26 @@ impl Island {
             acceleration.clear();
         });
         self.contacts.begin(&mut self.bodies, context);
+        self.iterate_until_done(context);
+        if self.contacts.is_empty() {
+            self.end_in_flight(context);
+        } else {
+            self.reject_steps_that_gain_energy(context);
+        }
+        self.bodies.iter().for_each(|b| self.report.counters.add(&b.preconditioner.counters));
+    }
+
+    fn iterate_until_done(&mut self, context: &SolveContext<'_>) {
         let iterations = self.bodies.iter().map(|b| b.settings.max_iterations).max().unwrap_or(0);
         for _ in 0..iterations {
             self.report.iterations += 1;
             let outcome = self.iterate(context);
-            let converged =
-                |b: &BodyProblem| b.residual() <= b.settings.tolerance.max(ROUNDING) * b.force_scale();
             let done = match outcome {
                 Outcome::Stalled => true,
                 Outcome::Turned => false,
                 Outcome::Descended => {
-                    self.contacts.is_done(FAR_FROM_SOLVED) && self.bodies.iter().all(converged)
+                    self.contacts.is_done(FAR_FROM_SOLVED)
+                        && self.bodies.iter().all(BodyProblem::has_converged)
                 }
             };
             if done {
@@ -105,12 +112,26 @@ impl Island {
                 }
             }
         }
-        if self.contacts.is_empty() {
-            self.bodies.iter_mut().filter(|b| b.key.pins.is_empty()).for_each(BodyProblem::balance);
-        } else {
-            self.reject_steps_that_gain_energy(context);
+    }
+
+    /// Ends the step of what touches nothing. Where it has not converged and makes energy, it is done again by implicit
+    /// Euler, if it was of the second order, and bounded.
+    fn end_in_flight(&mut self, context: &SolveContext<'_>) {
+        self.bodies.iter_mut().filter(|b| b.key.pins.is_empty()).for_each(BodyProblem::balance);
+        let exceeds = |b: &mut BodyProblem| !b.has_converged() && b.exceeds_energy();
+        let mut again = false;
+        for body in &mut self.bodies {
+            if exceeds(body) && body.restart_first_order() {
+                body.choose_initial_guess(context.factors.get(body.factor));
+                again = true;
+            }
         }
-        self.bodies.iter().for_each(|b| self.report.counters.add(&b.preconditioner.counters));
+        if again {
+            self.accelerations.iter_mut().for_each(Accelerator::clear);
+            self.iterate_until_done(context);
+            self.bodies.iter_mut().filter(|b| b.key.pins.is_empty()).for_each(BodyProblem::balance);
+        }
+        self.bodies.iter_mut().filter_map(|b| exceeds(b).then_some(b)).for_each(BodyProblem::bound_energy);
     }
 
     /// Bodies whose step is far from solved and would gain energy are rejected: where forces change wildly from iteration

@@ -28,9 +28,9 @@ mod sweep_tests;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use body_step::{BodyProblem, SECOND_ORDER};
+pub(crate) use body_step::{BodyProblem, ROUNDING, SECOND_ORDER};
 pub(crate) use constraints::{
     Articulation, ContactLimits, ContactResult, Reaction, RigidProxies, RigidProxy, SolveContext, Twist,
 };
-pub(crate) use island::{Island, IslandReport, ROUNDING};
+pub(crate) use island::{Island, IslandReport};
 pub(crate) use linear::{FactorCache, FactorId, FactorKey, STEPS_KEPT};

@@ -88,7 +88,11 @@ pub(super) fn store(
     }
     body.state.factor_base.note(h, &problem.key.base);
     let in_flight = work.island.contacts.active.is_empty();
-    problem.final_velocities(in_flight, &mut body.state.v);
+    let is_limited = problem.final_velocities(in_flight, &mut body.state.v);
+    if is_limited || problem.is_rejected {
+        // What a step of the second order has left unsolved grows by its extrapolation: the next one is of the first.
+        body.state.history.clear();
+    }
     body.state.x.clone_from(&problem.current.x);
     let share = problem.pin_share();
     for pin in &mut body.pins {

@@ -27,11 +27,13 @@ impl StepScratch {
             self.counters.skipped = true;
             return;
         }
+        parts.wake(&deformables.take_released());
         let context = StepContext { sets: parts.sets(), gravity: from_real(gravity), h: f64::from(dt) };
         self.solve_bodies(parameters, deformables, &context);
         let mut clock = Stopwatch::start();
         let asleep = &self.sleeping.rigid;
         self.reactions.write(parts, &self.scene, &self.reaction_list, &self.neighbourhood, asleep);
+        parts.wake(&deformables.take_released());
         self.counters.advance_time += clock.lap();
     }
 

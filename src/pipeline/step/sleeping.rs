@@ -148,6 +148,8 @@ impl Sleeping {
                 self.rigid.push(handle);
             }
         }
+        self.now.rigid.clear();
+        self.now.rigid.extend_from_slice(&self.rigid[first..]);
         for (k, handle) in handles.iter().enumerate() {
             let Some(body) = deformables.get_mut(*handle) else { continue };
             self.look_around(body, around);

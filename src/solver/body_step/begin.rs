@@ -24,6 +24,8 @@ impl BodyProblem {
             is_second_order: false,
             x_start: Vec::new(),
             v_start: Vec::new(),
+            before: Default::default(),
+            kinetic_bound: f64::INFINITY,
             spin: Vec3::zeros(),
             target: Vec::new(),
             masses: Vec::new(),
@@ -84,11 +86,14 @@ impl BodyProblem {
         self.step_damping = 1.0;
         self.guard_retries = 0;
         self.is_rejected = false;
+        self.kinetic_bound = f64::INFINITY;
         self.preconditioner.counters = SolveCounters::default();
         self.x_start.clone_from(&body.state.x);
         self.v_start.clone_from(&body.state.v);
         self.spin = Vec3::from(body.angular_momentum());
         if self.is_second_order {
+            self.before.0.clone_from(&body.state.x);
+            self.before.1.clone_from(&body.state.v);
             let history = &body.state.history;
             let starts = self.x_start.iter_mut().zip(&history.x);
             starts.chain(self.v_start.iter_mut().zip(&history.v)).for_each(|(now, before)| {

@@ -6,7 +6,7 @@ use crate::math::{Vec3, centre_of_mass, inertia_about, rotation_from_vector, sol
 /// Largest turn \[rad\] that [`BodyProblem::balance`] takes for the rest of an iteration.
 const MAX_BALANCING_TURN: f64 = 0.1;
 
-/// Largest rotation \[rad\] in a step that [`BodyProblem::final_velocities`] gives back.
+/// Largest rotation \[rad\] in a step that [`BodyProblem::final_velocities`] gives back where energy is not bounded.
 const MAX_SPIN_GIVEN: f64 = 0.5;
 
 impl BodyProblem {
@@ -28,15 +28,24 @@ impl BodyProblem {
         x.iter_mut().for_each(|x| *x = centre + shift + rotation * (*x - centre));
     }
 
-    /// Velocities at the end of the step [m/s]; `in_flight` tells that nothing touched the body or was attached to it. Implicit
-    /// Euler then loses angular momentum that nothing has taken: a rotation about the centre of mass puts
-    /// it back.
-    pub fn final_velocities(&self, in_flight: bool, v: &mut Vec<Vec3>) {
+    /// Velocities at the end of the step [m/s]; `in_flight` tells that nothing touched the body or was attached to it. True if
+    /// they had to be limited.
+    pub fn final_velocities(&self, in_flight: bool, v: &mut Vec<Vec3>) -> bool {
+        self.unlimited_velocities(in_flight, v);
+        self.limit_velocities(v)
+    }
+
+    pub(super) fn unlimited_velocities(&self, in_flight: bool, v: &mut Vec<Vec3>) {
         v.clear();
         v.extend(self.current.x.iter().zip(&self.x_start).map(|(new, old)| (new - old) / self.h));
-        if !(in_flight && self.settings.keeps_spin && self.key.pins.is_empty()) {
-            return;
+        if in_flight && self.settings.keeps_spin && self.key.pins.is_empty() {
+            self.give_back_spin(v);
         }
+    }
+
+    /// Implicit Euler loses angular momentum in flight that nothing has taken: a rotation about the centre of mass puts it
+    /// back.
+    fn give_back_spin(&self, v: &mut [Vec3]) {
         let (_, centre) = centre_of_mass(&self.current.x, &self.masses);
         let inertial = |i: usize| self.target[i] - self.x_start[i] - self.v_start[i] * self.h;
         let (mut gained, mut lost) = (Vec3::zeros(), Vec3::zeros());
@@ -50,7 +59,7 @@ impl BodyProblem {
         let missing = (self.spin + gained) / drag - lost;
         let inertia = inertia_about(&centre, &self.current.x, &self.masses);
         let turn = solve_semidefinite(&inertia, &missing);
-        if turn.norm() * self.h < MAX_SPIN_GIVEN {
+        if turn.norm() * self.h < MAX_SPIN_GIVEN || self.kinetic_bound.is_finite() {
             for (v, x) in v.iter_mut().zip(&self.current.x) {
                 *v += turn.cross(&(x - centre));
             }

@@ -44,6 +44,20 @@ impl BodyProblem {
         self.frame = turned;
         self.evaluate_current();
         self.trial.x.clone_from(&self.target);
+        self.accept_if_lower();
+        if is_pinned {
+            // Where Ψ of the present shape is no higher than of that carried on, the step makes no more of it.
+            self.trial.x.clone_from(&self.x_start);
+            self.key.pins.iter().for_each(|&p| self.trial.x[p as usize] = self.target[p as usize]);
+            if self.inertial_objective(&self.trial.x) < self.current.objective {
+                self.accept_if_lower();
+            }
+        }
+        self.choose_frames(&turned, factor);
+    }
+
+    /// Evaluates the trial positions and makes them the current ones if their Ψ is lower.
+    fn accept_if_lower(&mut self) {
         let mut trial = std::mem::take(&mut self.trial);
         self.evaluate(&mut trial, self.current.objective);
         self.trial = trial;
@@ -51,7 +65,6 @@ impl BodyProblem {
         if !(self.current.objective <= self.trial.objective) {
             self.accept_trial();
         }
-        self.choose_frames(&turned, factor);
     }
 
     fn choose_frames(&mut self, turned: &Mat3, factor: &SystemFactor) {

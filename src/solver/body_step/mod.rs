@@ -3,6 +3,7 @@
 mod problem;
 
 mod begin;
+mod energy_bound;
 mod finish;
 mod initial_guess;
 mod newton_factors;
@@ -10,4 +11,4 @@ mod rigid_fallback;
 
 pub(crate) use newton_factors::{Factors, NewtonFactors};
 pub(in crate::solver) use problem::are_large;
-pub(crate) use problem::{BodyProblem, SECOND_ORDER};
+pub(crate) use problem::{BodyProblem, ROUNDING, SECOND_ORDER};

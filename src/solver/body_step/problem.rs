@@ -18,6 +18,9 @@ use std::sync::Arc;
 /// Rotation of an iteration \[rad\] beyond which it is bent to a true one: below, the stretch is 5e-9.
 const BENT: f64 = 1.0e-4;
 
+/// Residual relative to the forces that is rounding and nothing else: sums of some tens of terms.
+pub(crate) const ROUNDING: f64 = 1.0e-12;
+
 /// Elements of bodies from which on they are worth several threads: an evaluation of so many takes 0.1 ms.
 const LARGE: usize = 4000;
 
@@ -48,6 +51,10 @@ pub(crate) struct BodyProblem {
     /// Positions and velocities at the start of the step; of the second order what they amount to.
     pub x_start: Vec<Vec3>,
     pub v_start: Vec<Vec3>,
+    /// Positions and velocities from which a step of the second order set out.
+    pub(super) before: (Vec<Vec3>, Vec<Vec3>),
+    /// What kinetic energy \[J\] a step leaves that has not converged; else any.
+    pub(super) kinetic_bound: f64,
     /// Angular momentum at the start.
     pub(super) spin: Vec3,
     /// Where the nodes would go without internal and contact forces.
@@ -241,7 +248,7 @@ impl BodyProblem {
         at.elastic = elastic.energy;
         at.least_trace = elastic.least_trace;
         at.internal = at.r.iter().map(|f| f.amax()).fold(0.0, f64::max);
-        let (inertia, drag) = (1.0 / (self.h * self.h), self.material.mass_damping / self.h);
+        let (inertia, drag) = self.inertia_and_drag();
         let mut kinetic = 0.0;
         for i in 0..at.x.len() {
             let (from_target, moved) = (self.target[i] - at.x[i], at.x[i] - self.x_start[i]);
@@ -250,6 +257,21 @@ impl BodyProblem {
             kinetic += m * (inertia * from_target.norm_squared() + drag * moved.norm_squared());
         }
         at.objective = elastic.energy + 0.5 * kinetic;
+    }
+
+    /// Factors of the masses in Ψ [1/s²], before distances to the target and from the start.
+    fn inertia_and_drag(&self) -> (f64, f64) {
+        (1.0 / (self.h * self.h), self.material.mass_damping / self.h)
+    }
+
+    /// What Ψ \[J\] is at least at `x`: what is not elastic.
+    pub(super) fn inertial_objective(&self, x: &[Vec3]) -> f64 {
+        let (inertia, drag) = self.inertia_and_drag();
+        let of = |i: usize| {
+            let (from_target, moved) = (self.target[i] - x[i], x[i] - self.x_start[i]);
+            self.masses[i] * (inertia * from_target.norm_squared() + drag * moved.norm_squared())
+        };
+        0.5 * (0..x.len()).map(of).sum::<f64>()
     }
 
     /// The guard [cf. Nocedal & Wright 2006, sufficient decrease]:
@@ -289,6 +311,10 @@ impl BodyProblem {
             largest = if size.is_nan() { f64::INFINITY } else { largest.max(size) };
         }
         largest
+    }
+
+    pub fn has_converged(&self) -> bool {
+        self.residual() <= self.settings.tolerance.max(ROUNDING) * self.force_scale()
     }
 
     /// The force that residuals are measured by \[N\].

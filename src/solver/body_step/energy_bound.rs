@@ -1,0 +1,148 @@
+//! Energy of a step without contact that has not converged: of what its positions and velocities hold, the velocities
+//! give back what nothing has put in. Where not even a rigid motion is left, the step is rejected.
+
+use super::problem::BodyProblem;
+use crate::math::{Vec3, centre_of_mass, inertia_about, rotation_from_vector, solve_semidefinite};
+
+/// Share of the energy of a step that rounding may make.
+const ROUNDED: f64 = 1.0e-9;
+
+/// Mean velocity [m/s] and angular velocity [rad/s] of nodes about their centre of mass.
+struct RigidMotion {
+    centre: Vec3,
+    velocity: Vec3,
+    spin: Vec3,
+}
+
+impl RigidMotion {
+    fn of(x: &[Vec3], v: &[Vec3], masses: &[f64]) -> Self {
+        let (total, centre) = centre_of_mass(x, masses);
+        let (mut momentum, mut angular) = (Vec3::zeros(), Vec3::zeros());
+        for ((x, v), m) in x.iter().zip(v).zip(masses) {
+            momentum += v * *m;
+            angular += (x - centre).cross(v) * *m;
+        }
+        let spin = solve_semidefinite(&inertia_about(&centre, x, masses), &angular);
+        Self { centre, velocity: momentum / total, spin }
+    }
+
+    fn at(&self, x: &Vec3) -> Vec3 {
+        self.velocity + self.spin.cross(&(x - self.centre))
+    }
+}
+
+fn kinetic<'a>(v: impl Iterator<Item = &'a Vec3>, masses: &[f64]) -> f64 {
+    0.5 * v.zip(masses).map(|(v, m)| m * v.norm_squared()).sum::<f64>()
+}
+
+impl BodyProblem {
+    /// Positions and velocities from which the step set out: of the second order others than those it starts from.
+    fn origin(&self) -> (&[Vec3], &[Vec3]) {
+        if self.is_second_order { (&self.before.0, &self.before.1) } else { (&self.x_start, &self.v_start) }
+    }
+
+    /// Finds what kinetic energy \[J\] the step leaves: that of its start, elastic and kinetic, with the work of external
+    /// forces and pins, less what is elastic at its end. True if its velocities hold more.
+    pub fn exceeds_energy(&mut self) -> bool {
+        let mut still = std::mem::take(&mut self.trial);
+        still.x.clear();
+        still.x.extend_from_slice(self.origin().0);
+        self.evaluate(&mut still, f64::INFINITY);
+        let elastic = still.elastic;
+        self.trial = still;
+        let (x, v) = self.origin();
+        let start = elastic + kinetic(v.iter(), &self.masses);
+        let mut work = 0.0;
+        let mut pins = self.key.pins.iter().peekable();
+        for (i, m) in self.masses.iter().enumerate() {
+            let moved = self.current.x[i] - x[i];
+            work += if pins.next_if(|&&p| p as usize == i).is_some() {
+                // The force of the pin.
+                -self.current.r[i].dot(&moved)
+            } else {
+                let external = (self.target[i] - self.x_start[i]) / self.h - self.v_start[i];
+                external.dot(&moved) * (m / self.h)
+            };
+        }
+        self.kinetic_bound = start + work - self.current.elastic + ROUNDED * start;
+        let mut v = Vec::new();
+        self.unlimited_velocities(true, &mut v);
+        // Written so that NaN counts as too much.
+        !(kinetic(v.iter(), &self.masses) <= self.kinetic_bound)
+    }
+
+    /// Puts the step back to its start, to be done by implicit Euler; false if it was.
+    pub fn restart_first_order(&mut self) -> bool {
+        if !self.is_second_order {
+            return false;
+        }
+        let scale = self.dt / self.h;
+        for i in 0..self.target.len() {
+            let pin = self.key.pins.binary_search(&(i as u32)).ok();
+            let target = pin.map_or(&mut self.target[i], |k| &mut self.pinned_inertia[k]);
+            let fall = (*target - self.x_start[i]) / self.h - self.v_start[i];
+            *target = self.before.0[i] + (self.before.1[i] + fall * scale) * self.dt;
+        }
+        std::mem::swap(&mut self.x_start, &mut self.before.0);
+        std::mem::swap(&mut self.v_start, &mut self.before.1);
+        (self.h, self.is_second_order) = (self.dt, false);
+        self.damping.begin(&self.model, self.material.stiffness_damping, self.h, &self.x_start, None);
+        (self.step_damping, self.kinetic_bound) = (1.0, f64::INFINITY);
+        true
+    }
+
+    /// Rejects the step if its bound is less than what momentum asks for.
+    pub fn bound_energy(&mut self) {
+        // Written so that NaN counts as less.
+        if !(self.kinetic_bound >= self.rigid_energy()) {
+            self.reject_free_step();
+        }
+    }
+
+    /// Kinetic energy \[J\] of the rigid motion at the end of the step, which momentum fixes; none of a pinned body.
+    fn rigid_energy(&self) -> f64 {
+        if !self.key.pins.is_empty() {
+            return 0.0;
+        }
+        let mut v = Vec::new();
+        self.unlimited_velocities(true, &mut v);
+        let motion = RigidMotion::of(&self.current.x, &v, &self.masses);
+        v.iter_mut().zip(&self.current.x).for_each(|(v, x)| *v = motion.at(x));
+        kinetic(v.iter(), &self.masses)
+    }
+
+    /// Takes the body on in its shape, as a rigid one; a pinned one stays where it was.
+    fn reject_free_step(&mut self) {
+        self.is_rejected = true;
+        self.kinetic_bound = f64::INFINITY;
+        self.current.x.clone_from(&self.x_start);
+        if self.key.pins.is_empty() {
+            let motion = RigidMotion::of(&self.x_start, &self.v_start, &self.masses);
+            let (_, led_to) = centre_of_mass(&self.target, &self.masses);
+            let rotation = rotation_from_vector(&(motion.spin * self.h));
+            self.current.x.iter_mut().for_each(|x| *x = led_to + rotation * (*x - motion.centre));
+        } else {
+            self.key.pins.iter().for_each(|&p| self.current.x[p as usize] = self.target[p as usize]);
+        }
+        self.evaluate_current();
+    }
+
+    /// Takes from velocities at the end of the step [m/s] what they hold beyond the bound, of a free body from what is
+    /// not its rigid motion; true if there was something to take.
+    pub(super) fn limit_velocities(&self, v: &mut [Vec3]) -> bool {
+        if kinetic(v.iter(), &self.masses) <= self.kinetic_bound {
+            return false;
+        }
+        let is_free = self.key.pins.is_empty();
+        let motion = is_free.then(|| RigidMotion::of(&self.current.x, v, &self.masses));
+        let rigid: Vec<Vec3> =
+            self.current.x.iter().map(|x| motion.as_ref().map_or(Vec3::zeros(), |m| m.at(x))).collect();
+        let kept = kinetic(rigid.iter(), &self.masses);
+        let rest: Vec<Vec3> = v.iter().zip(&rigid).map(|(v, rigid)| v - rigid).collect();
+        let share = ((self.kinetic_bound - kept) / kinetic(rest.iter(), &self.masses)).clamp(0.0, 1.0);
+        // NaN where nothing but the rigid motion is left.
+        let scale = if share > 0.0 { share.sqrt() } else { 0.0 };
+        v.iter_mut().zip(&rigid).zip(&rest).for_each(|((v, rigid), rest)| *v = rigid + rest * scale);
+        true
+    }
+}
