@@ -45,6 +45,14 @@ pub enum BodyError {
         /// Its value.
         value: Vector,
     },
+    /// A quaternion that is NaN, infinite or not of unit length.
+    #[error("{quantity} is no rotation: the quaternion {value:?} is not of unit length")]
+    NoRotation {
+        /// What was to be set.
+        quantity: &'static str,
+        /// Its components x, y, z and w.
+        value: [f32; 4],
+    },
     /// No vertices to act on.
     #[error("{quantity}: the list of vertices is empty")]
     NoVertices {

@@ -103,3 +103,39 @@ fn spinning_bars_of_the_second_order_never_gain_energy() {
         }
     }
 }
+
+/// A bar whose pinned end is led to and fro: what leads it gives it energy, which is no gain, however few the iterations.
+#[test]
+fn a_bar_that_is_led_follows_at_any_number_of_iterations() {
+    let reach = |iterations: Option<usize>| {
+        let mut physics = PhysicsWorld::new();
+        physics.gravity = Vector::ZERO;
+        let mut world = DeformableWorld::new();
+        let bar = DeformableBodyBuilder::cuboid(Vector::new(0.25, 0.05, 0.05), [10, 2, 2])
+            .material(DeformableMaterial::new(1e6, 0.3))
+            .pinned(|x| x.x < -0.2499)
+            .can_sleep(false);
+        let settings = iterations.map_or_else(SolverSettings::default, SolverSettings::iterations);
+        let bar = world.insert(bar.settings(settings)).unwrap();
+        let pins = at_rest_where(&world.bodies[bar], |p| p[0] < -0.2499);
+        let tip = at_rest_where(&world.bodies[bar], |p| p[0] > 0.2499);
+        let mut farthest = 0.0f64;
+        for step in 0..60 {
+            let body = &mut world.bodies[bar];
+            for &pin in &pins {
+                let [x, y, z] = body.model().rest_position(pin);
+                let led = 0.2 * (step as f64 / 60.0 * std::f64::consts::TAU).sin();
+                body.move_pin(pin, Vector::new(x as f32, (y + led) as f32, z as f32)).unwrap();
+            }
+            world.step(&mut physics);
+            farthest = farthest.max(mean_position(&world.bodies[bar], &tip)[1]);
+        }
+        farthest
+    };
+    let converged = reach(Some(200));
+    for iterations in [None, Some(1), Some(3)] {
+        let farthest = reach(iterations);
+        println!("{iterations:?}: the tip comes as far as {farthest:.4} m, converged {converged:.4} m");
+        assert!((farthest / converged - 1.0).abs() < 0.1, "{iterations:?}: {farthest} of {converged} m");
+    }
+}

@@ -24,19 +24,13 @@ fn uniaxial(stress: impl Fn(f64, f64) -> [f64; 2], stretch: f64) -> f64 {
 /// Cells of the stretched bar, which is 0.5 m long and 0.1 m wide: cubes of 0.05 m.
 const BAR_CELLS: [usize; 3] = [10, 2, 2];
 
-/// Uniform traction that sums to `pull` \[N\] on both ends: each vertex its share of the faces of the lattice.
+/// Uniform traction that sums to `pull` \[N\] on both ends.
 fn pull_ends(bar: &mut DeformableBody, pull: f64) {
-    let mesh = TetMesh::cuboid([0.25, 0.05, 0.05], BAR_CELLS).unwrap();
-    let triangles: Vec<[u32; 3]> = bar.model().surface_triangles().collect();
-    for triangle in triangles {
-        let p = triangle.map(|v| mesh.vertices()[v as usize]);
-        for end in [-0.25, 0.25] {
-            if p.iter().all(|p| p[0] == end) {
-                // Right triangles of half a face of 0.05 m.
-                let share = pull / 8.0 * end.signum();
-                bar.add_force(&triangle.map(|v| v as usize), Vector::X * share as f32).unwrap();
-            }
-        }
+    for end in [-1.0, 1.0] {
+        let vertices = at_rest_where(bar, |p| p[0] * end > 0.2499);
+        let area = bar.add_traction(&vertices, Vector::X * (end * pull / 0.01) as f32).unwrap();
+        // Half extents in f32.
+        assert!((area - 0.01).abs() < 1e-8);
     }
 }
 

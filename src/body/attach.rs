@@ -48,7 +48,7 @@ impl DeformableBodySet {
             AttachTo::World => Anchors::World(nodes.iter().map(x).collect()),
             AttachTo::RigidBody(handle, pose) => {
                 super::body::finite("pose of the rigid body", pose.translation)?;
-                super::body::finite("rotation of the rigid body", pose.rotation.to_scaled_axis())?;
+                super::body::rotation("rotation of the rigid body", pose.rotation)?;
                 let pose = Pose64::from_real(&pose);
                 Anchors::Rigid(handle, nodes.iter().map(|n| pose.inverse_transform(&x(n))).collect())
             }

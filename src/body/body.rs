@@ -11,7 +11,7 @@ use crate::math::{Vec3, from_real, to_real};
 use parry3d::bounding_volume::Aabb;
 use rapier3d::dynamics::CoefficientCombineRule;
 use rapier3d::geometry::InteractionGroups;
-use rapier3d::math::Vector;
+use rapier3d::math::{Rotation, Vector};
 use std::sync::Arc;
 
 /// A vertex held in place, or led along by its user.
@@ -183,6 +183,14 @@ impl DeformableBody {
         let weights = &self.model.node_volumes;
         let sum = values.iter().zip(weights).fold(Vec3::zeros(), |a, (p, w)| a + p * *w);
         sum / weights.iter().sum::<f64>()
+    }
+}
+
+/// A rotation of the user's, if it is one.
+pub(super) fn rotation(quantity: &'static str, value: Rotation) -> Result<(), BodyError> {
+    match value.is_finite() && value.is_normalized() {
+        true => Ok(()),
+        false => Err(BodyError::NoRotation { quantity, value: value.to_array() }),
     }
 }
 

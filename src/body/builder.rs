@@ -178,9 +178,12 @@ impl DeformableBodyBuilder {
         self
     }
 
-    /// Sets the knobs of the solver to those of a preset, for what the body is made of.
+    /// Sets the knobs of the solver to those of a preset, for what the body is made of. The integrator, which no preset is
+    /// about, stays as it was set.
     pub fn fidelity(mut self, fidelity: Fidelity) -> Self {
-        self.settings = fidelity.settings(self.model.as_ref().map_or(Build::Solid, |m| m.build()));
+        let integrator = self.settings.integrator;
+        let preset = fidelity.settings(self.model.as_ref().map_or(Build::Solid, |m| m.build()));
+        self.settings = preset.integrator(integrator);
         self
     }
 

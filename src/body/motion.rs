@@ -1,6 +1,6 @@
 //! Mass, momentum and energy of a body, and setting it in motion.
 
-use super::body::{DeformableBody, finite};
+use super::body::{DeformableBody, finite, rotation};
 use crate::error::BodyError;
 use crate::fem::elastic_forces;
 use crate::math::{Pose64, Vec3, to_real};
@@ -118,7 +118,7 @@ impl DeformableBody {
         self.wake_up();
         self.state.history.clear();
         finite("translation", by.translation)?;
-        finite("rotation", by.rotation.to_scaled_axis())?;
+        rotation("rotation", by.rotation)?;
         let pose = Pose64::from_real(&by);
         self.state.x.iter_mut().for_each(|x| *x = pose.transform(x));
         self.state.v.iter_mut().for_each(|v| *v = pose.rotation * *v);

@@ -74,8 +74,10 @@ impl TetMesh {
     ///
     /// # Errors
     /// [`MeshError::NotFillable`] for shapes that enclose nothing (half-spaces, heightfields, segments,
-    /// triangles) and for compounds and voxels, else as [`TetMesh::fill_surface`].
+    /// triangles) and for compounds and voxels, [`MeshError::BadSize`] for a radius or length that is not positive, else as
+    /// [`TetMesh::fill_surface`].
     pub fn fill_shape(shape: &dyn Shape, cell_size: f32) -> Result<Self, MeshError> {
+        check_sizes(shape)?;
         let (vertices, triangles) = match shape.as_typed_shape() {
             TypedShape::Ball(s) => s.to_trimesh(CIRCLE, CIRCLE / 2),
             TypedShape::Cuboid(s) => s.to_trimesh(),
@@ -94,6 +96,23 @@ impl TetMesh {
         };
         Self::fill_surface(&vertices, &triangles, cell_size)
     }
+}
+
+/// A capsule has two ends, in any order, and no sign of its length.
+fn check_sizes(shape: &dyn Shape) -> Result<(), MeshError> {
+    let radius = |radius: f32| [("radius", radius); 3];
+    let sizes = match shape.as_typed_shape() {
+        TypedShape::Ball(s) => radius(s.radius),
+        TypedShape::Capsule(s) => radius(s.radius),
+        TypedShape::Cuboid(s) => s.half_extents.to_array().map(|e| ("half extent", e)),
+        TypedShape::Cylinder(s) => {
+            [("radius", s.radius), ("half height", s.half_height), ("radius", s.radius)]
+        }
+        TypedShape::Cone(s) => [("radius", s.radius), ("half height", s.half_height), ("radius", s.radius)],
+        _ => return Ok(()),
+    };
+    let bad = sizes.into_iter().find(|(_, size)| !(size.is_finite() && *size > 0.0));
+    bad.map_or(Ok(()), |(quantity, value)| Err(MeshError::BadSize { quantity, value: value.into() }))
 }
 
 /// The hull of a convex shape's extreme points in many directions.
@@ -143,7 +162,7 @@ fn signed_volume_of(vertices: &[Vector], triangles: &[[u32; 3]]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use parry3d::shape::{Capsule, Cone, Cuboid, Cylinder, HalfSpace, RoundShape};
+    use parry3d::shape::{Capsule, Cone, Cuboid, Cylinder, HalfSpace, RoundShape, Segment};
 
     #[test]
     fn filled_shapes_contain_their_volume_and_little_more() {
@@ -172,6 +191,15 @@ mod tests {
     fn shapes_and_surfaces_that_enclose_nothing_are_refused() {
         let plane = HalfSpace::new(Vector::Y);
         assert!(matches!(TetMesh::fill_shape(&plane, 0.1), Err(MeshError::NotFillable { .. })));
+        let negative: [&dyn Shape; 4] = [
+            &Ball::new(-0.5),
+            &Cylinder { half_height: -0.5, radius: 0.3 },
+            &Cone { half_height: 0.5, radius: 0.0 },
+            &Capsule { segment: Segment::new(Vector::ZERO, Vector::Y), radius: f32::NAN },
+        ];
+        for shape in negative {
+            assert!(matches!(TetMesh::fill_shape(shape, 0.1), Err(MeshError::BadSize { .. })));
+        }
         let open = [Vector::ZERO, Vector::X, Vector::Y];
         assert!(matches!(
             TetMesh::fill_surface(&open, &[[0, 1, 2]], 0.1),

@@ -19,7 +19,7 @@ impl TetMesh {
     /// five tetrahedra whose diagonals alternate with the cell's parity.
     ///
     /// # Errors
-    /// [`MeshError::BadLattice`] when an axis has no cells or no extent, [`MeshError::TooLarge`].
+    /// [`MeshError::BadLattice`] when an axis has no cells or no extent, [`MeshError::TooLarge`], [`MeshError::Extent`].
     pub fn cuboid(half_extents: [f64; 3], cells: [usize; 3]) -> Result<Self, MeshError> {
         if cells.contains(&0) || !half_extents.iter().all(|&e| e.is_finite() && e > 0.0) {
             return Err(MeshError::BadLattice { cells, half_extents });
@@ -87,5 +87,8 @@ mod tests {
         assert!(matches!(TetMesh::cuboid([1.0; 3], [1, 0, 1]), Err(MeshError::BadLattice { .. })));
         assert!(matches!(TetMesh::cuboid([1.0, -1.0, 1.0], [1; 3]), Err(MeshError::BadLattice { .. })));
         assert!(matches!(TetMesh::cuboid([1.0; 3], [usize::MAX; 3]), Err(MeshError::TooLarge { .. })));
+        for size in [1e-10, 1e20] {
+            assert!(matches!(TetMesh::cuboid([size; 3], [1; 3]), Err(MeshError::Extent { .. })), "{size}");
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! What a body can be made of besides tetrahedra: sheets, rods and springs over shared vertices.
 
-use super::tet_mesh::{MeshError, TetMesh};
+use super::tet_mesh::{MeshError, TetMesh, check_extent, check_finite};
 use crate::math::Vec3;
 
 /// Lengths over that of the whole below which an edge counts as none.
@@ -75,7 +75,7 @@ impl Structure {
     /// What is wrong with the triangles or the thickness.
     pub fn sheet(vertices: Vec<[f64; 3]>, triangles: &[[u32; 3]], thickness: f64) -> Result<Self, MeshError> {
         let structure = Self { vertices, ..Self::default() };
-        check_vertices(&structure.vertices)?;
+        check_finite(&structure.vertices)?;
         structure.with_sheet(triangles, thickness)
     }
 
@@ -130,7 +130,7 @@ impl Structure {
     /// # Errors
     /// Fewer than two points, points on one another, a bad radius.
     pub fn rod(points: &[[f64; 3]], radius: f64) -> Result<Self, MeshError> {
-        check_vertices(points)?;
+        check_finite(points)?;
         let structure = Self { vertices: points.to_vec(), ..Self::default() };
         structure.with_rod((0..points.len() as u32).collect(), radius)
     }
@@ -197,7 +197,7 @@ impl Structure {
     /// # Errors
     /// As [`Structure::rod`].
     pub fn rod_from(mut self, start: u32, points: &[[f64; 3]], radius: f64) -> Result<Self, MeshError> {
-        check_vertices(points)?;
+        check_finite(points)?;
         let first = self.vertices.len() as u32;
         if start >= first {
             let (ends, vertices) = ([start, first], self.vertices.len());
@@ -227,7 +227,7 @@ impl Structure {
     /// Whether a body of it has mass everywhere: every vertex belongs to a tetrahedron, a sheet or a rod.
     ///
     /// # Errors
-    /// [`MeshError::Empty`], [`MeshError::UnusedVertex`].
+    /// [`MeshError::Empty`], [`MeshError::UnusedVertex`], [`MeshError::Extent`].
     pub(crate) fn check(&self) -> Result<(), MeshError> {
         let mut used = vec![false; self.vertices.len()];
         let corners = self.tetrahedra.iter().flatten();
@@ -236,7 +236,7 @@ impl Structure {
         match used.iter().position(|u| !u) {
             _ if used.is_empty() => Err(MeshError::Empty),
             Some(vertex) => Err(MeshError::UnusedVertex { vertex }),
-            None => Ok(()),
+            None => check_extent(&self.vertices),
         }
     }
 
@@ -259,13 +259,6 @@ impl Structure {
             true => Ok(()),
             false => Err(MeshError::ShortEdge { ends, length }),
         }
-    }
-}
-
-fn check_vertices(vertices: &[[f64; 3]]) -> Result<(), MeshError> {
-    match vertices.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
-        Some(vertex) => Err(MeshError::NotFinite { vertex, position: vertices[vertex] }),
-        None => Ok(()),
     }
 }
 

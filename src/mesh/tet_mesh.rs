@@ -23,6 +23,12 @@ pub enum MeshError {
         /// Its position \[m\].
         position: [f64; 3],
     },
+    /// Too small or too large for what `f32` and gravity make of metres.
+    #[error("the mesh is {extent:e} m across: what is simulated is between 1e-6 and 1e6 m")]
+    Extent {
+        /// Its largest extent along an axis \[m\].
+        extent: f64,
+    },
     /// An index points outside the vertex list.
     #[error("tetrahedron {tet} refers to vertex {vertex}, but there are {vertices} vertices")]
     IndexOutOfRange {
@@ -215,10 +221,7 @@ impl TetMesh {
         if tetrahedra.is_empty() {
             return Err(MeshError::Empty);
         }
-        if let Some(vertex) = vertices.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
-            let position = vertices[vertex];
-            return Err(MeshError::NotFinite { vertex, position });
-        }
+        check_finite(&vertices)?;
         let mut used = vec![false; vertices.len()];
         let mut volumes = Vec::with_capacity(tetrahedra.len());
         for (tet, corners) in tetrahedra.iter().enumerate() {
@@ -230,6 +233,7 @@ impl TetMesh {
             return Err(MeshError::UnusedVertex { vertex });
         }
         check_surface(&tetrahedra)?;
+        check_extent(&vertices)?;
         Ok(Self { vertices, tetrahedra, volumes })
     }
 
@@ -252,6 +256,26 @@ impl TetMesh {
     pub fn volume(&self) -> f64 {
         self.volumes.iter().sum()
     }
+}
+
+pub(super) fn check_finite(vertices: &[[f64; 3]]) -> Result<(), MeshError> {
+    match vertices.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
+        Some(vertex) => Err(MeshError::NotFinite { vertex, position: vertices[vertex] }),
+        None => Ok(()),
+    }
+}
+
+/// Extents \[m\] of what can be simulated: f32 keeps 6e-8 of a place, and squares far beyond overflow it.
+const EXTENTS: [f64; 2] = [1.0e-6, 1.0e6];
+
+/// Whether a mesh or structure has the size of something in a world of metres.
+pub(super) fn check_extent(vertices: &[[f64; 3]]) -> Result<(), MeshError> {
+    let along = |axis: usize| {
+        let places = || vertices.iter().map(|v| v[axis]);
+        places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min)
+    };
+    let extent = (0..3).map(along).fold(0.0, f64::max);
+    if (EXTENTS[0]..=EXTENTS[1]).contains(&extent) { Ok(()) } else { Err(MeshError::Extent { extent }) }
 }
 
 fn check_indices(tet: usize, corners: &[u32; 4], vertices: usize) -> Result<(), MeshError> {

@@ -31,11 +31,17 @@ impl RigidMotion {
     }
 }
 
-fn kinetic<'a>(v: impl Iterator<Item = &'a Vec3>, masses: &[f64]) -> f64 {
-    0.5 * v.zip(masses).map(|(v, m)| m * v.norm_squared()).sum::<f64>()
-}
-
 impl BodyProblem {
+    /// Kinetic energy \[J\] of the nodes that are not pinned: what leads a pin gives its node the energy of its own motion.
+    fn kinetic_energy<'a>(&self, v: impl Iterator<Item = &'a Vec3>) -> f64 {
+        let mut pins = self.key.pins.iter().peekable();
+        let of = |(i, (v, m)): (usize, (&Vec3, &f64))| match pins.next_if(|&&p| p as usize == i) {
+            Some(_) => 0.0,
+            None => m * v.norm_squared(),
+        };
+        0.5 * v.zip(&self.masses).enumerate().map(of).sum::<f64>()
+    }
+
     /// Positions and velocities from which the step set out: of the second order others than those it starts from.
     fn origin(&self) -> (&[Vec3], &[Vec3]) {
         if self.is_second_order { (&self.before.0, &self.before.1) } else { (&self.x_start, &self.v_start) }
@@ -51,7 +57,7 @@ impl BodyProblem {
         let elastic = still.elastic;
         self.trial = still;
         let (x, v) = self.origin();
-        let start = elastic + kinetic(v.iter(), &self.masses);
+        let start = elastic + self.kinetic_energy(v.iter());
         let mut work = 0.0;
         let mut pins = self.key.pins.iter().peekable();
         for (i, m) in self.masses.iter().enumerate() {
@@ -65,10 +71,12 @@ impl BodyProblem {
             };
         }
         self.kinetic_bound = start + work - self.current.elastic + ROUNDED * start;
-        let mut v = Vec::new();
+        let mut v = std::mem::take(&mut self.force);
         self.unlimited_velocities(true, &mut v);
+        let held = self.kinetic_energy(v.iter());
+        self.force = v;
         // Written so that NaN counts as too much.
-        !(kinetic(v.iter(), &self.masses) <= self.kinetic_bound)
+        !(held <= self.kinetic_bound)
     }
 
     /// Puts the step back to its start, to be done by implicit Euler; false if it was.
@@ -108,7 +116,7 @@ impl BodyProblem {
         self.unlimited_velocities(true, &mut v);
         let motion = RigidMotion::of(&self.current.x, &v, &self.masses);
         v.iter_mut().zip(&self.current.x).for_each(|(v, x)| *v = motion.at(x));
-        kinetic(v.iter(), &self.masses)
+        self.kinetic_energy(v.iter())
     }
 
     /// Takes the body on in its shape, as a rigid one; a pinned one stays where it was.
@@ -130,19 +138,24 @@ impl BodyProblem {
     /// Takes from velocities at the end of the step [m/s] what they hold beyond the bound, of a free body from what is
     /// not its rigid motion; true if there was something to take.
     pub(super) fn limit_velocities(&self, v: &mut [Vec3]) -> bool {
-        if kinetic(v.iter(), &self.masses) <= self.kinetic_bound {
+        if self.kinetic_energy(v.iter()) <= self.kinetic_bound {
             return false;
         }
         let is_free = self.key.pins.is_empty();
         let motion = is_free.then(|| RigidMotion::of(&self.current.x, v, &self.masses));
         let rigid: Vec<Vec3> =
             self.current.x.iter().map(|x| motion.as_ref().map_or(Vec3::zeros(), |m| m.at(x))).collect();
-        let kept = kinetic(rigid.iter(), &self.masses);
+        let kept = self.kinetic_energy(rigid.iter());
         let rest: Vec<Vec3> = v.iter().zip(&rigid).map(|(v, rigid)| v - rigid).collect();
-        let share = ((self.kinetic_bound - kept) / kinetic(rest.iter(), &self.masses)).clamp(0.0, 1.0);
+        let share = ((self.kinetic_bound - kept) / self.kinetic_energy(rest.iter())).clamp(0.0, 1.0);
         // NaN where nothing but the rigid motion is left.
         let scale = if share > 0.0 { share.sqrt() } else { 0.0 };
-        v.iter_mut().zip(&rigid).zip(&rest).for_each(|((v, rigid), rest)| *v = rigid + rest * scale);
+        let mut pins = self.key.pins.iter().peekable();
+        for (i, v) in v.iter_mut().enumerate() {
+            if pins.next_if(|&&p| p as usize == i).is_none() {
+                *v = rigid[i] + rest[i] * scale;
+            }
+        }
         true
     }
 }
