@@ -114,11 +114,11 @@ impl Island {
         }
     }
 
-    /// Ends the step of what touches nothing. Where it has not converged and makes energy, it is done again by implicit
+    /// Ends the step of what touches nothing. Where it is far from solved and makes energy, it is done again by implicit
     /// Euler, if it was of the second order, and bounded.
     fn end_in_flight(&mut self, context: &SolveContext<'_>) {
         self.bodies.iter_mut().filter(|b| b.key.pins.is_empty()).for_each(BodyProblem::balance);
-        let exceeds = |b: &mut BodyProblem| !b.has_converged() && b.exceeds_energy();
+        let exceeds = |b: &mut BodyProblem| b.may_have_gained() && b.exceeds_energy();
         let mut again = false;
         for body in &mut self.bodies {
             if exceeds(body) && body.restart_first_order() {
