@@ -163,10 +163,20 @@ fn every_cube_lies_still_at_240_and_1000_steps_a_second() {
     }
 }
 
-/// Slabs that droop over the edges of a box, turned about it or not.
+/// Slabs that droop over the edges of a box, turned about it or not. The last four trembled with 1.4e-2 to 3.3e-2 m/s: their
+/// edges cross the box's with both ends away from it.
 #[test]
 fn slabs_over_the_edges_of_a_box_lie_still() {
-    for (half, turn, offset) in [(0.1, 0.0, 0.0), (0.1, 0.3, 0.0), (0.15, 0.1, 0.03)] {
+    const BOXES: [(f32, f32, f32); 7] = [
+        (0.1, 0.0, 0.0),
+        (0.1, 0.3, 0.0),
+        (0.15, 0.1, 0.03),
+        (0.1, 0.5, 0.0),
+        (0.15, 0.2, 0.0),
+        (0.15, 0.3, 0.0),
+        (0.15, 0.3, 0.03),
+    ];
+    for (half, turn, offset) in BOXES {
         let (mut physics, _) = world_with_floor(1.0 / 60.0);
         let support = RigidBodyBuilder::fixed().translation(Vector::Y * 0.5).rotation(Vector::Y * turn);
         physics.insert(support, ColliderBuilder::cuboid(half, 0.1, half).friction(0.8));

@@ -16,12 +16,24 @@ impl TetMesh {
         let path = path.as_ref();
         let fail = |reason: String| MeshError::File { path: path.display().to_string(), reason };
         let bytes = std::fs::read(path).map_err(|e| fail(e.to_string()))?;
+        if let Some(version) = version_of(&bytes).filter(|version| version != "4.1") {
+            let advice = "only 4.1 is read, as `gmsh -save -format msh41` writes it";
+            return Err(fail(format!("line 2, $MeshFormat: version {version}; {advice}")));
+        }
         // The parser's message spans several lines and quotes the file; its first says what failed.
         let file = mshio::parse_msh_bytes(&bytes)
             .map_err(|e| fail(format!("not a Gmsh 4.1 mesh: {}", first_line(&e.to_string()))))?;
         let (vertices, tetrahedra) = tetrahedra_of(&file).map_err(fail)?;
         TetMesh::new(vertices, tetrahedra)
     }
+}
+
+/// The version that the header of a file names, if it has one.
+fn version_of(bytes: &[u8]) -> Option<String> {
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(64)]);
+    let mut lines = head.lines().map(str::trim);
+    let version = lines.next().filter(|first| *first == "$MeshFormat").and_then(|_| lines.next())?;
+    version.split_whitespace().next().map(str::to_owned)
 }
 
 fn first_line(message: &str) -> &str {
@@ -100,6 +112,17 @@ mod tests {
         assert_eq!(mesh.tetrahedra().len(), 1);
         assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-15);
         std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
+    fn other_versions_are_named() {
+        for version in ["2.2", "4", "4.0"] {
+            let path =
+                written(&format!("{version}.msh"), &CORNER.replace("4.1 0 8", &format!("{version} 0 8")));
+            let error = TetMesh::read_gmsh(&path).unwrap_err().to_string();
+            assert!(error.contains(&format!("version {version}")) && error.contains("line 2"), "{error}");
+            std::fs::remove_file(path).unwrap();
+        }
     }
 
     #[test]
