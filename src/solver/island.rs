@@ -117,21 +117,29 @@ impl Island {
     /// Ends the step of what touches nothing. Where it is far from solved and makes energy, it is done again by implicit
     /// Euler, if it was of the second order, and bounded.
     fn end_in_flight(&mut self, context: &SolveContext<'_>) {
-        self.bodies.iter_mut().filter(|b| b.key.pins.is_empty()).for_each(BodyProblem::balance);
-        let exceeds = |b: &mut BodyProblem| b.may_have_gained() && b.exceeds_energy();
+        self.balance();
         let mut again = false;
-        for body in &mut self.bodies {
-            if exceeds(body) && body.restart_first_order() {
+        for body in self.bodies.iter_mut().filter_map(|b| b.gained().then_some(b)) {
+            if body.restart_first_order() {
                 body.choose_initial_guess(context.factors.get(body.factor));
                 again = true;
+            } else {
+                body.bound_energy();
             }
         }
         if again {
             self.accelerations.iter_mut().for_each(Accelerator::clear);
             self.iterate_until_done(context);
-            self.bodies.iter_mut().filter(|b| b.key.pins.is_empty()).for_each(BodyProblem::balance);
+            self.balance();
+            self.bodies
+                .iter_mut()
+                .filter_map(|b| b.gained().then_some(b))
+                .for_each(BodyProblem::bound_energy);
         }
-        self.bodies.iter_mut().filter_map(|b| exceeds(b).then_some(b)).for_each(BodyProblem::bound_energy);
+    }
+
+    fn balance(&mut self) {
+        self.bodies.iter_mut().filter(|b| b.key.pins.is_empty()).for_each(BodyProblem::balance);
     }
 
     /// Bodies whose step is far from solved and would gain energy are rejected: where forces change wildly from iteration

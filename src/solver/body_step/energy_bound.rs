@@ -50,14 +50,16 @@ impl BodyProblem {
         if self.is_second_order { (&self.before.0, &self.before.1) } else { (&self.x_start, &self.v_start) }
     }
 
-    /// Whether so much is left of the iteration that it is worth an evaluation to know what the step has made.
-    pub fn may_have_gained(&self) -> bool {
-        !(self.residual() <= self.settings.tolerance.max(HARMLESS) * self.force_scale())
+    /// Whether so much is left of the iteration that it is worth an evaluation to know what the step has made, and it has
+    /// made energy.
+    pub fn gained(&mut self) -> bool {
+        let is_solved = self.residual() <= self.settings.tolerance.max(HARMLESS) * self.force_scale();
+        !is_solved && self.exceeds_energy()
     }
 
     /// Finds what kinetic energy \[J\] the step leaves: that of its start, elastic and kinetic, with the work of external
     /// forces and pins, less what is elastic at its end. True if its velocities hold more.
-    pub fn exceeds_energy(&mut self) -> bool {
+    fn exceeds_energy(&mut self) -> bool {
         let mut still = std::mem::take(&mut self.trial);
         still.x.clear();
         still.x.extend_from_slice(self.origin().0);

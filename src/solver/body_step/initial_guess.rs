@@ -18,7 +18,7 @@ const STAY: f64 = 0.5;
 
 impl BodyProblem {
     /// Chooses where the iteration starts, and the frames of the preconditioner: the rigidly extrapolated
-    /// shape or the inertial target, or of a pinned body where it is, whichever has the lower Ψ.
+    /// shape or the inertial target, whichever has the lower Ψ; of a pinned body where it is, if that has much less.
     pub fn choose_initial_guess(&mut self, factor: &SystemFactor) {
         let model = self.model.clone();
         let is_pinned = !self.key.pins.is_empty();
