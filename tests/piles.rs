@@ -17,10 +17,10 @@ fn pile(count: usize, world: &mut DeformableWorld) -> PhysicsWorld {
     for k in 0..count {
         let builder = match k % 5 {
             0 => DeformableBodyBuilder::cuboid(Vector::splat(0.12), [4; 3]),
-            1 => DeformableBodyBuilder::filled(&Ball::new(0.13), 0.05),
+            1 => DeformableBodyBuilder::filled(&Ball::new(0.13), 0.0625),
             2 => DeformableBodyBuilder::cuboid(Vector::new(0.2, 0.06, 0.1), [6, 2, 4]),
-            3 => DeformableBodyBuilder::filled(&Capsule::new_y(0.08, 0.09), 0.05),
-            _ => DeformableBodyBuilder::filled(&Cylinder::new(0.08, 0.13), 0.05),
+            3 => DeformableBodyBuilder::filled(&Capsule::new_y(0.08, 0.09), 0.0625),
+            _ => DeformableBodyBuilder::filled(&Cylinder::new(0.08, 0.13), 0.0625),
         };
         let (layer, place) = (k / 4, k % 4);
         let side = |positive: bool| if positive { 0.22 } else { -0.22 };

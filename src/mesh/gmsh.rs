@@ -1,6 +1,7 @@
 //! Gmsh 4.1 `.msh` files.
 
-use super::tet_mesh::{MeshError, TetMesh};
+use super::mesh_error::MeshError;
+use super::tet_mesh::TetMesh;
 use mshio::mshfile::{ElementType, MshFile};
 use std::collections::HashMap;
 use std::path::Path;

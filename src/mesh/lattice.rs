@@ -1,6 +1,7 @@
 //! Cuboids as lattices of cells, five tetrahedra each.
 
-use super::tet_mesh::{MeshError, TetMesh, signed_volume};
+use super::mesh_error::MeshError;
+use super::tet_mesh::{TetMesh, signed_volume};
 use crate::math::Vec3;
 
 /// Corners (bit 0 = x, bit 1 = y, bit 2 = z) of the five tetrahedra of an even cell: one in the

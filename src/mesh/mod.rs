@@ -6,13 +6,15 @@ mod fill;
 #[cfg(feature = "gmsh")]
 mod gmsh;
 mod lattice;
+mod mesh_error;
 mod ordering;
 mod structure;
 mod surface;
 mod tet_mesh;
 
+pub use mesh_error::MeshError;
 pub(crate) use ordering::{node_adjacency, sweep_order};
 pub use structure::Structure;
 pub(crate) use surface::{NONE, Surface};
-pub use tet_mesh::{MeshError, TetMesh};
+pub use tet_mesh::TetMesh;
 pub(crate) use tet_mesh::{signed_volume, tetrahedron_holds};

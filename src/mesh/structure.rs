@@ -1,6 +1,7 @@
 //! What a body can be made of besides tetrahedra: sheets, rods and springs over shared vertices.
 
-use super::tet_mesh::{MeshError, TetMesh, check_extent, check_finite};
+use super::mesh_error::MeshError;
+use super::tet_mesh::{TetMesh, check_extent, check_finite};
 use crate::math::Vec3;
 
 /// Lengths over that of the whole below which an edge counts as none.

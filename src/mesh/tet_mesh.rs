@@ -1,199 +1,12 @@
 //! A tetrahedral mesh that is valid by construction.
 
+use super::mesh_error::MeshError;
 use super::surface::{EdgeUse, boundary_triangles, edge_uses};
 use crate::math::{Mat3, Vec3};
-use thiserror::Error;
 
 /// Relative volume (volume over cubed longest edge) below which a tetrahedron counts as flat; a
 /// regular one has 0.118. Flatter ones have gradients that no double precision factor survives.
 const FLAT: f64 = 1.0e-9;
-
-/// What is wrong with a mesh.
-#[derive(Clone, Debug, Error, PartialEq)]
-#[non_exhaustive]
-pub enum MeshError {
-    /// No elements at all.
-    #[error("the mesh has no elements")]
-    Empty,
-    /// A coordinate is NaN or infinite.
-    #[error("vertex {vertex} is not finite: {position:?}")]
-    NotFinite {
-        /// Index of the vertex.
-        vertex: usize,
-        /// Its position \[m\].
-        position: [f64; 3],
-    },
-    /// Too small or too large for what `f32` and gravity make of metres.
-    #[error("the mesh is {extent:e} m across: what is simulated is between 1e-6 and 1e6 m")]
-    Extent {
-        /// Its largest extent along an axis \[m\].
-        extent: f64,
-    },
-    /// An index points outside the vertex list.
-    #[error("tetrahedron {tet} refers to vertex {vertex}, but there are {vertices} vertices")]
-    IndexOutOfRange {
-        /// Index of the tetrahedron.
-        tet: usize,
-        /// The index it holds.
-        vertex: u32,
-        /// Number of vertices.
-        vertices: usize,
-    },
-    /// A triangle of a surface to be filled, or of a sheet, points outside the vertex list.
-    #[error("triangle {triangle} refers to vertex {vertex}, but there are {vertices} vertices")]
-    TriangleOutOfRange {
-        /// Index of the triangle.
-        triangle: usize,
-        /// The index it holds.
-        vertex: u32,
-        /// Number of vertices.
-        vertices: usize,
-    },
-    /// A tetrahedron names one vertex twice.
-    #[error("tetrahedron {tet} uses vertex {vertex} twice")]
-    RepeatedVertex {
-        /// Index of the tetrahedron.
-        tet: usize,
-        /// The repeated vertex.
-        vertex: u32,
-    },
-    /// A triangle of a sheet names a vertex twice.
-    #[error("triangle {triangle} names vertex {vertex} twice")]
-    RepeatedInTriangle {
-        /// Index of the triangle.
-        triangle: usize,
-        /// The repeated vertex.
-        vertex: u32,
-    },
-    /// A triangle is in a sheet twice.
-    #[error("triangle {triangle} is there twice: {vertices:?}")]
-    RepeatedTriangle {
-        /// Index of the second one.
-        triangle: usize,
-        /// Its vertices, ascending.
-        vertices: [u32; 3],
-    },
-    /// A triangle of a sheet without area to speak of.
-    #[error("triangle {triangle} is flat (area {area:e} m² with a longest edge of {edge:e} m)")]
-    FlatTriangle {
-        /// Index of the triangle.
-        triangle: usize,
-        /// Its area \[m²\].
-        area: f64,
-        /// Its longest edge \[m\].
-        edge: f64,
-    },
-    /// A rod or spring ends outside the vertex list.
-    #[error("the edge {ends:?} refers to vertex {vertex}, but there are {vertices} vertices")]
-    EndOutOfRange {
-        /// Vertices of the edge.
-        ends: [u32; 2],
-        /// The index that is out of range.
-        vertex: u32,
-        /// Number of vertices.
-        vertices: usize,
-    },
-    /// A rod or spring without length to speak of.
-    #[error("the edge {ends:?} has no length ({length:e} m)")]
-    ShortEdge {
-        /// Vertices of the edge.
-        ends: [u32; 2],
-        /// Its length \[m\].
-        length: f64,
-    },
-    /// A thickness, radius or cross-section that is not a positive number.
-    #[error("{quantity} is {value}, but must be positive and finite")]
-    BadSize {
-        /// What was given.
-        quantity: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// Negative orientation.
-    #[error("tetrahedron {tet} is inverted (signed volume {volume:e} m³)")]
-    Inverted {
-        /// Index of the tetrahedron.
-        tet: usize,
-        /// Its signed volume \[m³\].
-        volume: f64,
-    },
-    /// No volume to speak of.
-    #[error("tetrahedron {tet} is flat (volume {volume:e} m³ with a longest edge of {edge:e} m)")]
-    Flat {
-        /// Index of the tetrahedron.
-        tet: usize,
-        /// Its volume \[m³\].
-        volume: f64,
-        /// Its longest edge \[m\].
-        edge: f64,
-    },
-    /// A vertex that no tetrahedron uses has no mass.
-    #[error("vertex {vertex} belongs to no tetrahedron")]
-    UnusedVertex {
-        /// Index of the vertex.
-        vertex: usize,
-    },
-    /// Three or more tetrahedra meet in one face.
-    #[error("{count} tetrahedra share the face {face:?}")]
-    NonManifoldFace {
-        /// Vertices of the face, ascending.
-        face: [u32; 3],
-        /// Number of tetrahedra on it.
-        count: usize,
-    },
-    /// The boundary surface branches, or closes on itself, in an edge.
-    #[error("{count} boundary triangles meet in the edge {edge:?}: the surface is not manifold")]
-    NonManifoldEdge {
-        /// Vertices of the edge, ascending.
-        edge: [u32; 2],
-        /// Number of boundary triangles on it; two would be right.
-        count: usize,
-    },
-    /// A lattice without cells or extent.
-    #[error("a cuboid of {cells:?} cells and half extents {half_extents:?} m has no volume")]
-    BadLattice {
-        /// Requested cells per axis.
-        cells: [usize; 3],
-        /// Requested half extents \[m\].
-        half_extents: [f64; 3],
-    },
-    /// More vertices than 32-bit indices can name.
-    #[error("a mesh of {vertices} vertices does not fit 32-bit indices")]
-    TooLarge {
-        /// Requested number of vertices.
-        vertices: usize,
-    },
-    /// A cell size that is not a positive number, or so small that the fill would not fit memory.
-    #[error("cell size {cell_size} m does not fill a shape of extents {extents:?} m")]
-    BadCellSize {
-        /// Requested cell size \[m\].
-        cell_size: f32,
-        /// Extents of the shape's bounding box \[m\].
-        extents: [f32; 3],
-    },
-    /// The surface encloses nothing that could be filled.
-    #[error("the surface of {triangles} triangles encloses no volume at cell size {cell_size} m")]
-    NothingEnclosed {
-        /// Triangles of the surface.
-        triangles: usize,
-        /// Requested cell size \[m\].
-        cell_size: f32,
-    },
-    /// A shape that cannot be filled.
-    #[error("a shape of type {shape} is not one that can be filled with tetrahedra")]
-    NotFillable {
-        /// Name of the shape's type.
-        shape: String,
-    },
-    /// A mesh file that cannot be read.
-    #[error("mesh file {path}: {reason}")]
-    File {
-        /// The file as it was named.
-        path: String,
-        /// What is wrong with it.
-        reason: String,
-    },
-}
 
 /// Tetrahedra over shared vertices: indices in range, positive volumes, every vertex used, and a
 /// closed manifold surface. All of it is checked once, in [`TetMesh::new`].
@@ -255,6 +68,20 @@ impl TetMesh {
     /// Volume of the mesh \[m³\].
     pub fn volume(&self) -> f64 {
         self.volumes.iter().sum()
+    }
+
+    /// The six dihedral angles of each tetrahedron \[°\]: the nearer to 0 or 180 they are, the less a step can do with it.
+    pub fn dihedral_angles(&self) -> impl Iterator<Item = f64> {
+        self.tetrahedra.iter().flat_map(|tet| {
+            let x = tet.map(|v| Vec3::from(self.vertices[v as usize]));
+            [[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 2, 0], [2, 3, 0, 1]].map(
+                |[a, b, c, d]| {
+                    let edge = x[b] - x[a];
+                    let (p, q) = (edge.cross(&(x[c] - x[a])), edge.cross(&(x[d] - x[a])));
+                    p.cross(&q).norm().atan2(p.dot(&q)).to_degrees()
+                },
+            )
+        })
     }
 }
 
@@ -337,6 +164,15 @@ mod tests {
 
     fn corner() -> Vec<[f64; 3]> {
         vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    }
+
+    #[test]
+    fn a_regular_tetrahedron_has_its_dihedral_angles() {
+        let x = vec![[1.0; 3], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, 1.0]];
+        let mesh = TetMesh::new(x, vec![[0, 1, 2, 3]]).unwrap();
+        let third: f64 = 1.0 / 3.0;
+        assert!(mesh.dihedral_angles().all(|a| (a - third.acos().to_degrees()).abs() < 1e-12));
+        assert_eq!(mesh.dihedral_angles().count(), 6);
     }
 
     #[test]
