@@ -101,7 +101,9 @@ impl DeformableMaterial {
         self
     }
 
-    /// Sets the coefficient of restitution.
+    /// Sets the coefficient of restitution: of a pair of bodies and an impact faster than
+    /// `DeformableParameters::restitution_threshold` (0.5 m/s unless set), the least speed of departure over that of the
+    /// approach where the bodies store nothing. What elasticity returns by itself counts; restitution adds what is missing.
     #[must_use]
     pub fn restitution(mut self, restitution: f64) -> Self {
         self.restitution = restitution;

@@ -66,6 +66,7 @@ impl DeformableBody {
             v: vec![Vec3::zeros(); model.rest.len()],
             contacts: Vec::new(),
             shared: Vec::new(),
+            impacts: Vec::new(),
             history: History::default(),
             sleep: Sleep::default(),
             factor_base: FactorBase::default(),

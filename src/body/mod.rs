@@ -7,6 +7,7 @@
 mod constraint_memory;
 mod factor_base;
 mod handle;
+mod impact;
 mod settings;
 mod state;
 
@@ -37,6 +38,7 @@ pub(crate) use constraint_memory::{
     JointAxis, ObstacleContact, RigidPairContact, SoftPairContact, SoftPairKind,
 };
 pub use handle::{DeformableAttachmentHandle, DeformableBodyHandle};
+pub(crate) use impact::{Impact, Partner};
 pub use set::DeformableBodySet;
 pub use settings::{Acceleration, FactorPrecision, Fidelity, Frames, Integrator, Solver, SolverSettings};
 pub(crate) use sleep::TIME_UNTIL_SLEEP;

@@ -125,6 +125,7 @@ impl DeformableBody {
         self.pins.iter_mut().for_each(|p| p.target = pose.transform(&p.target));
         self.state.contacts.clear();
         self.state.shared.clear();
+        self.state.impacts.clear();
         Ok(())
     }
 }

@@ -3,6 +3,7 @@
 use super::constraint_memory::{ConstraintKey, ConstraintMemory};
 use super::factor_base::FactorBase;
 use super::handle::DeformableBodyHandle;
+use super::impact::Impact;
 use crate::math::{Pose64, Vec3};
 use rapier3d::dynamics::RigidBodyHandle;
 
@@ -19,6 +20,8 @@ pub struct DeformableState {
     /// Constraints of the rigid neighbourhood and of attachments in the last step, ascending by key; with the first body
     /// of the island.
     pub(crate) shared: Vec<ConstraintMemory>,
+    /// What it hits and has not parted from, with restitution.
+    pub(crate) impacts: Vec<Impact>,
     /// Where the last step began, of bodies that go forward by two.
     pub(crate) history: History,
     pub(crate) sleep: Sleep,

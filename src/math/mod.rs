@@ -9,6 +9,8 @@ pub(crate) use vectorized::vectorized;
 pub(crate) mod dense;
 pub(crate) mod lanes;
 pub(crate) mod polar;
+mod rigid_motion;
+pub(crate) use rigid_motion::RigidMotion;
 
 use rapier3d::math::Vector;
 

@@ -19,7 +19,7 @@ use std::time::Duration;
 pub struct DeformableParameters {
     /// Speed [m/s] at which overlaps found at the start of a step are undone.
     pub max_corrective_velocity: f64,
-    /// New contacts that approach below this speed [m/s] do not bounce.
+    /// Bodies that approach below this speed [m/s] do not bounce, whatever their restitution.
     pub restitution_threshold: f64,
     /// Rigid bodies, at the most, whose contacts and joints with other rigid bodies enter the solve,
     /// counted from the touched ones outward. Zero leaves these to rapier alone: its contacts are springs
@@ -52,7 +52,7 @@ impl DeformableParameters {
         Self { max_corrective_velocity, ..self }
     }
 
-    /// Sets the speed [m/s] below which new contacts do not bounce.
+    /// Sets the speed of approach [m/s] below which bodies do not bounce.
     #[must_use]
     pub fn restitution_threshold(self, restitution_threshold: f64) -> Self {
         Self { restitution_threshold, ..self }

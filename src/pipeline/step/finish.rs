@@ -98,6 +98,7 @@ pub(super) fn store(
     for pin in &mut body.pins {
         pin.force = problem.pin_force(pin.node, &share);
     }
+    body.state.impacts.clone_from(&problem.impacts);
     work.memory_of(local, h, &mut body.state.contacts);
     body.state.shared.clear();
     if local == 0 {

@@ -142,13 +142,14 @@ impl BodyWork {
         if !problem.current.x.iter().all(is_number) {
             return;
         }
-        let DeformableState { x, v, contacts, shared, history, .. } = &mut body.state;
+        let DeformableState { x, v, contacts, shared, impacts, history, .. } = &mut body.state;
         history.clear();
         for (i, (new, old)) in problem.current.x.iter().zip(&problem.x_start).enumerate() {
             (x[i], v[i]) = (*new, (new - old) / problem.h());
         }
         contacts.clear();
         shared.clear();
+        impacts.clear();
     }
 
     /// Finds the body's contacts.

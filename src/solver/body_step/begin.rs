@@ -30,6 +30,7 @@ impl BodyProblem {
             target: Vec::new(),
             masses: Vec::new(),
             damping: StiffnessDamping::default(),
+            impacts: Vec::new(),
             current: Iterate::default(),
             trial: Iterate::default(),
             contact_force: vec![Vec3::zeros(); n],
@@ -90,6 +91,7 @@ impl BodyProblem {
         self.preconditioner.counters = SolveCounters::default();
         self.x_start.clone_from(&body.state.x);
         self.v_start.clone_from(&body.state.v);
+        self.impacts.clone_from(&body.state.impacts);
         self.spin = Vec3::from(body.angular_momentum());
         if self.is_second_order {
             self.before.0.clone_from(&body.state.x);

@@ -2,37 +2,13 @@
 //! give back what nothing has put in. Where not even a rigid motion is left, the step is rejected.
 
 use super::problem::BodyProblem;
-use crate::math::{Vec3, centre_of_mass, inertia_about, rotation_from_vector, solve_semidefinite};
+use crate::math::{RigidMotion, Vec3, centre_of_mass, rotation_from_vector};
 
 /// Residual over forces that gains next to nothing: the default tolerance. Checked at any, ten iterations of L-BFGS took
 /// 1.2 times as long (with two evaluations a step; now it is one).
 const HARMLESS: f64 = 5.0e-3;
 /// Share of the energy of a step that rounding may make.
 const ROUNDED: f64 = 1.0e-9;
-
-/// Mean velocity [m/s] and angular velocity [rad/s] of nodes about their centre of mass.
-struct RigidMotion {
-    centre: Vec3,
-    velocity: Vec3,
-    spin: Vec3,
-}
-
-impl RigidMotion {
-    fn of(x: &[Vec3], v: &[Vec3], masses: &[f64]) -> Self {
-        let (total, centre) = centre_of_mass(x, masses);
-        let (mut momentum, mut angular) = (Vec3::zeros(), Vec3::zeros());
-        for ((x, v), m) in x.iter().zip(v).zip(masses) {
-            momentum += v * *m;
-            angular += (x - centre).cross(v) * *m;
-        }
-        let spin = solve_semidefinite(&inertia_about(&centre, x, masses), &angular);
-        Self { centre, velocity: momentum / total, spin }
-    }
-
-    fn at(&self, x: &Vec3) -> Vec3 {
-        self.velocity + self.spin.cross(&(x - self.centre))
-    }
-}
 
 impl BodyProblem {
     /// Kinetic energy \[J\] of the nodes that are not pinned: what leads a pin gives its node the energy of its own motion.
@@ -57,17 +33,34 @@ impl BodyProblem {
         !is_solved && self.exceeds_energy()
     }
 
-    /// Finds what kinetic energy \[J\] the step leaves: that of its start, elastic and kinetic, with the work of external
-    /// forces and pins, less what is elastic at its end. True if its velocities hold more.
-    fn exceeds_energy(&mut self) -> bool {
+    /// Elastic and kinetic energy at the start \[J\]. Takes the trial positions' place.
+    pub fn start_energy(&mut self) -> f64 {
         let mut still = std::mem::take(&mut self.trial);
         still.x.clear();
         still.x.extend_from_slice(self.origin().0);
         self.evaluate(&mut still, f64::INFINITY);
         let elastic = still.elastic;
         self.trial = still;
-        let (x, v) = self.origin();
-        let start = elastic + self.kinetic_energy(v.iter());
+        elastic + self.kinetic_energy(self.origin().1.iter())
+    }
+
+    /// The rigid motion at the start.
+    pub fn rigid_motion(&self) -> RigidMotion {
+        RigidMotion::of(&self.x_start, &self.v_start, &self.masses)
+    }
+
+    /// Velocity that external forces give to the centre of mass in the step [m/s].
+    pub fn free_fall(&self) -> Vec3 {
+        let (_, led_to) = centre_of_mass(&self.target, &self.masses);
+        let motion = self.rigid_motion();
+        (led_to - motion.centre) / self.h - motion.velocity
+    }
+
+    /// Finds what kinetic energy \[J\] the step leaves: that of its start, elastic and kinetic, with the work of external
+    /// forces and pins, less what is elastic at its end. True if its velocities hold more.
+    fn exceeds_energy(&mut self) -> bool {
+        let start = self.start_energy();
+        let (x, _) = self.origin();
         let mut work = 0.0;
         let mut pins = self.key.pins.iter().peekable();
         for (i, m) in self.masses.iter().enumerate() {
@@ -135,7 +128,7 @@ impl BodyProblem {
         self.kinetic_bound = f64::INFINITY;
         self.current.x.clone_from(&self.x_start);
         if self.key.pins.is_empty() {
-            let motion = RigidMotion::of(&self.x_start, &self.v_start, &self.masses);
+            let motion = self.rigid_motion();
             let (_, led_to) = centre_of_mass(&self.target, &self.masses);
             let rotation = rotation_from_vector(&(motion.spin * self.h));
             self.current.x.iter_mut().for_each(|x| *x = led_to + rotation * (*x - motion.centre));

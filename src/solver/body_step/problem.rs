@@ -4,7 +4,7 @@
 //! `s = x_n + h v_n + h² M⁻¹ f_ext` [Bouaziz et al. 2014], E the elastic energy with the stiffness
 //! damping of the step. The residual is `r = −∂Ψ/∂x` \[N\]; pinned nodes are not unknowns.
 
-use crate::body::{PrescribedNode, SolverSettings};
+use crate::body::{Impact, PrescribedNode, SolverSettings};
 use crate::fem::elastic_forces::{Evaluation, StiffnessDamping};
 use crate::fem::{DeformableModel, Elements, elastic_forces};
 use crate::material::DeformableMaterial;
@@ -61,6 +61,8 @@ pub(crate) struct BodyProblem {
     pub target: Vec<Vec3>,
     pub(super) masses: Vec<f64>,
     pub(super) damping: StiffnessDamping,
+    /// Those that have not ended.
+    pub impacts: Vec<Impact>,
     pub current: Iterate,
     pub trial: Iterate,
     /// Contact forces on the nodes \[N\].

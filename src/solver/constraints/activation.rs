@@ -4,6 +4,7 @@
 use super::context::SolveContext;
 use super::delassus::steady_geometry;
 use super::gaps::{end, shorter_edge, target_gap};
+use super::impacts::restitute;
 use super::lists::{ActiveContact, Candidate};
 use super::system::{Change, ContactSystem, ContactWork};
 use crate::contact::Constraint;
@@ -28,8 +29,9 @@ impl ContactSystem {
         self.free.method.begin();
         self.active.clear();
         for candidate in &mut self.candidates {
-            candidate.constraint.target_gap = target_gap(&candidate.constraint, bodies, context);
+            candidate.constraint.target_gap = target_gap(&candidate.constraint, context);
         }
+        restitute(&mut self.candidates, bodies, context);
         let carries =
             |constraint: &Constraint| constraint.warm_force != Vec3::zeros() || constraint.key.is_shared();
         self.activate_if(|candidate| carries(&candidate.constraint));

@@ -2,27 +2,28 @@
 
 use super::context::SolveContext;
 use super::rigid_proxy::Reaction;
+use crate::body::ConstraintKey;
 use crate::contact::{Constraint, Endpoint, Law};
 use crate::math::Vec3;
 use crate::solver::body_step::BodyProblem;
 
 /// What to add to the motion along the normal so that zero is the target_gap.
-pub(super) fn target_gap(constraint: &Constraint, bodies: &[BodyProblem], context: &SolveContext<'_>) -> f64 {
+pub(super) fn target_gap(constraint: &Constraint, context: &SolveContext<'_>) -> f64 {
     let (h, limits) = (context.h, context.limits);
     if let Law::Bilateral { .. } = constraint.law {
         // What gives way is pulled back by its own force.
         let fastest = if constraint.compliance > 0.0 { f64::INFINITY } else { limits.recovery_speed * h };
         return constraint.gap.clamp(-fastest, fastest);
     }
-    let velocity = |endpoint: &Endpoint| match endpoint {
-        Endpoint::Soft { body, .. } => endpoint.interpolate(&bodies[*body].v_start),
-        _ => context.proxies.velocity(endpoint, context.h),
-    };
+    let velocity = |endpoint: &Endpoint| context.proxies.velocity(endpoint, context.h);
     let approach =
         -constraint.frame[0].dot(&(velocity(&constraint.endpoints[0]) - velocity(&constraint.endpoints[1])));
     let hits = constraint.gap < approach * h;
     let is_new = constraint.warm_force == Vec3::zeros();
-    if is_new && hits && constraint.restitution > 0.0 && approach > limits.restitution_threshold {
+    // Those of deformable bodies are for `impacts`.
+    let is_rigid = matches!(constraint.key, ConstraintKey::RigidPair(_));
+    let bounces = is_rigid && constraint.restitution > 0.0 && approach > limits.restitution_threshold;
+    if is_new && hits && bounces {
         // Leaves with e times the speed it came with, from where it is.
         return -constraint.restitution * approach * h;
     }

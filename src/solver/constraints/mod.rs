@@ -17,6 +17,7 @@ mod matrix_free;
 mod coarse_space;
 
 mod gaps;
+mod impacts;
 
 mod lists;
 

@@ -192,6 +192,16 @@ impl RigidProxies {
         }
     }
 
+    /// Velocity that an endpoint gains in the step without contact [m/s, rad/s].
+    pub fn falls(&self, endpoint: &Endpoint) -> Vec3 {
+        match endpoint.proxy().map(|id| self.get(id)) {
+            Some(proxy @ (RigidProxy::Rigid { twist, free, .. } | RigidProxy::Link { twist, free, .. })) => {
+                proxy.at(endpoint, free) - proxy.at(endpoint, twist)
+            }
+            _ => Vec3::zeros(),
+        }
+    }
+
     /// Velocity that an impulse at endpoint `by` gives to endpoint `at`, for each unit along `direction`.
     pub fn mobility(&self, at: &Endpoint, by: &Endpoint, direction: &Vec3) -> Vec3 {
         let (Some(i), Some(j)) = (at.proxy(), by.proxy()) else { return Vec3::zeros() };
