@@ -132,6 +132,47 @@ fn tilted_and_soft_partners_make_no_energy_by_restitution() {
     }
 }
 
+/// Cubes that cannot carry their own weight, or hardly, dropped by 1 m: what is a film in the end lies on the floor,
+/// be it a solid, a mesh or a heightfield.
+#[test]
+fn heavy_soft_cubes_stay_on_sheets() {
+    let square = [(-5.0, -5.0), (-5.0, 5.0), (5.0, 5.0), (5.0, -5.0)].map(|(x, z)| Vector::new(x, 0.0, z));
+    let field = |n: usize| {
+        let heights = rapier3d::parry::utils::Array2::zeros(n, n);
+        ColliderBuilder::heightfield(heights, Vector::new(10.0, 1.0, 10.0))
+    };
+    let floors = [
+        ColliderBuilder::cuboid(5.0, 0.5, 5.0).translation(Vector::Y * -0.5),
+        field(11),
+        field(101),
+        ColliderBuilder::trimesh(square.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap(),
+    ];
+    for (kind, floor) in floors.iter().enumerate() {
+        // 2.4e3 Pa and 6450 kg/m³ fell through heightfields.
+        for (e_modulus, density, cells) in [(2.4e3, 6450.0, 3), (1e4, 1000.0, 4), (1e6, 1000.0, 4)] {
+            let mut physics = PhysicsWorld::new();
+            physics.integration_parameters.dt = 1.0 / 120.0;
+            physics.insert(RigidBodyBuilder::fixed(), floor.clone());
+            let mut world = DeformableWorld::new();
+            let body = DeformableBodyBuilder::cuboid(Vector::splat(0.14), [cells; 3])
+                .translation(Vector::new(0.03, 1.14, 0.02))
+                .material(DeformableMaterial::new(e_modulus, 0.3).density(density));
+            let body = world.insert(body).unwrap();
+            let lowest = |world: &DeformableWorld| {
+                world.bodies[body].positions().map(|p| p[1]).fold(f32::INFINITY, f32::min)
+            };
+            let mut deepest = 0.0f32;
+            for _ in 0..360 {
+                world.step(&mut physics);
+                deepest = deepest.min(lowest(&world));
+            }
+            let name = format!("floor {kind}, {e_modulus:e} Pa, {density} kg/m³");
+            println!("{name}: {deepest:.1e} m at the deepest, {:.1e} m at the end", lowest(&world));
+            assert!(deepest > -0.03 && lowest(&world) > -1e-4, "{name}: {deepest} m, {} m", lowest(&world));
+        }
+    }
+}
+
 struct Throw {
     /// Largest growth of the total energy in a step, and above its start, per impact energy.
     growth: f64,

@@ -55,6 +55,7 @@ impl<'a> PairScene<'a> {
             band: BAND * model.size,
             shift: SHIFT * surface.mean_edge,
             extent: if is_box { 0.0 } else { farthest },
+            middle: local.iter().sum::<Vec3>() / local.len().max(1) as f64,
         };
         Self {
             pair,

@@ -152,7 +152,7 @@ mod tests {
     use parry3d::shape::SharedShape;
     use proptest::prelude::*;
 
-    const SCALES: Scales = Scales { band: 1e-5, shift: 0.01, extent: 0.0 };
+    const SCALES: Scales = Scales { band: 1e-5, shift: 0.01, extent: 0.0, middle: Vec3::new(0.0, 1.0, 0.0) };
 
     fn obstacle(shape: SharedShape) -> Obstacle {
         let start = Pose64 { rotation: Mat3::identity(), translation: Vec3::zeros() };

@@ -23,7 +23,7 @@ pub(crate) struct SurfacePoint {
     pub flat: bool,
 }
 
-/// Lengths that decide which of the normals is used.
+/// What decides which of the normals is used, in the obstacle's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scales {
     /// Nearer than this to the surface a projection's direction is noise \[m\].
@@ -33,6 +33,8 @@ pub(crate) struct Scales {
     /// Largest coordinate of what parry projects onto, beside that of the point itself \[m\]: its `f32` rounds by
     /// 6e-8 of it.
     pub extent: f64,
+    /// Middle of the body's surface.
+    pub middle: Vec3,
 }
 
 /// Sine below which a direction counts as a normal: f32 places of a metre, seen from a shift of millimetres, give 1e-5.
@@ -66,18 +68,13 @@ pub(crate) fn surface_point(
     let faces_body = |normal: &Vec3| normal.dot(outward) < FACING;
     let near = hit.distance <= scales.band;
     if obstacle.solidity() == Solidity::Sheet {
-        let mut normal = match (near, hit.face) {
-            (true, Some(face)) => face,
-            (true, None) => -outward,
-            (false, face) => face_or(hit.direction?, face),
+        // Just behind a sheet, seen from the body: the node has passed and is to come back. Not so if the whole body is
+        // on that side: crushed, it looks away from what is below it, and went through.
+        let is_behind = |normal: &Vec3| {
+            hit.distance < scales.shift
+                && (hit.face.is_none() || (scales.middle - hit.point).dot(normal) < 0.0)
         };
-        // Just behind a sheet, seen from the body: the node has passed and is to come back.
-        let passed = if hit.face.is_some() { PASSED_FACE } else { PASSED_LINE };
-        let behind = hit.distance < scales.shift && normal.dot(outward) > passed;
-        if behind || (near && !faces_body(&normal)) {
-            normal = -normal;
-        }
-        return Some(hit.with(p, normal));
+        return on_sheet(&hit, p, outward, near, is_behind);
     }
     if !hit.inside && !near {
         return Some(hit.with(p, face_or(hit.direction?, hit.face)));
@@ -98,6 +95,37 @@ pub(crate) fn surface_point(
         }
         _ => Some(hit.with(p, hit.face.or(inward).unwrap_or(-outward))),
     }
+}
+
+/// As [`surface_point`], of a node that a sheet carried in the last step along a normal against `outward`: it is on that side
+/// of it still, however far it has passed.
+pub(crate) fn carried_point(
+    obstacle: &Obstacle,
+    p: &Vec3,
+    outward: &Vec3,
+    scales: &Scales,
+) -> Option<SurfacePoint> {
+    let hit = project(obstacle, p)?;
+    on_sheet(&hit, p, outward, hit.distance <= scales.band, |_| true)
+}
+
+/// On the side of a sheet where `p` is, unless it looks out of the body there and `is_behind` says so.
+fn on_sheet(
+    hit: &Projection,
+    p: &Vec3,
+    outward: &Vec3,
+    near: bool,
+    is_behind: impl Fn(&Vec3) -> bool,
+) -> Option<SurfacePoint> {
+    let normal = match (near, hit.face) {
+        (true, Some(face)) => face,
+        (true, None) => -outward,
+        (false, face) => face_or(hit.direction?, face),
+    };
+    let passed = if hit.face.is_some() { PASSED_FACE } else { PASSED_LINE };
+    let has_passed = normal.dot(outward) > passed && is_behind(&normal);
+    let looks_away = near && normal.dot(outward) >= FACING;
+    Some(hit.with(p, if has_passed || looks_away { -normal } else { normal }))
 }
 
 /// Unit direction from `p` to the nearest point of the obstacle's surface, if that is farther than `band` \[m\].
@@ -220,7 +248,7 @@ mod tests {
         Obstacle::new((ProxyId(0), 0, 0), shape, [start, start])
     }
 
-    const SCALES: Scales = Scales { band: 4e-5, shift: 0.01, extent: 0.0 };
+    const SCALES: Scales = Scales { band: 4e-5, shift: 0.01, extent: 0.0, middle: Vec3::new(0.0, 1.0, 0.0) };
 
     #[test]
     fn normal_is_one_and_continuous_through_the_surface_of_every_solid_shape() {

@@ -28,10 +28,8 @@ pub(crate) fn side_of_node(
     memory: &[ConstraintMemory],
     band: f64,
 ) -> Vec3 {
-    let own = |m: &&ConstraintMemory| matches!(m.key, ConstraintKey::Obstacle(c) if c.feature == Feature::Node(node));
-    let carried = memory.iter().find(own);
-    if let Some(carried) = carried {
-        return -obstacle.start.rotation.tr_mul(&carried.geometry.frame[0]);
+    if let Some(carried) = against_carried(obstacle, node, memory) {
+        return carried;
     }
     // What has no inside either is on the side where it is.
     if obstacle.solidity() == Solidity::Sheet
@@ -41,6 +39,13 @@ pub(crate) fn side_of_node(
     }
     let towards = from_real(obstacle.shape.compute_local_aabb().center()) - p;
     motion.try_normalize(1e-12).or_else(|| towards.try_normalize(0.0)).unwrap_or_else(|| -Vec3::y())
+}
+
+/// Against the normal that carried a node in the last step, in the obstacle's frame, if one did.
+pub(crate) fn against_carried(obstacle: &Obstacle, node: u32, memory: &[ConstraintMemory]) -> Option<Vec3> {
+    let own = |m: &&ConstraintMemory| matches!(m.key, ConstraintKey::Obstacle(c) if c.feature == Feature::Node(node));
+    let carried = memory.iter().find(own)?;
+    Some(-obstacle.start.rotation.tr_mul(&carried.geometry.frame[0]))
 }
 
 /// Whether a triangle has to be turned over to look at the obstacle: as its corners found it (`found`), else
