@@ -30,7 +30,7 @@ pub(super) fn scan(lattice: &Lattice, vertices: &[Vec3], triangles: &[[u32; 3]])
             Vec3::new(x[0] - shift - ASIDE[0], x[1] - shift - ASIDE[1], x[2] - shift)
         };
         for triangle in triangles {
-            cross_lines(triangle, &[0, 1, 2].map(|k| local(&triangle[k])), &n, &mut lines);
+            cross_lines(&triangle.each_ref().map(local), &n, &mut lines);
         }
         for (line, crossings) in lines.iter_mut().enumerate() {
             crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -51,7 +51,7 @@ pub(super) fn scan(lattice: &Lattice, vertices: &[Vec3], triangles: &[[u32; 3]])
 }
 
 /// Enters where a triangle crosses the lines over it.
-fn cross_lines(ids: &[u32; 3], x: &[Vec3; 3], n: &[usize; 3], lines: &mut [Crossings]) {
+fn cross_lines(x: &[Vec3; 3], n: &[usize; 3], lines: &mut [Crossings]) {
     let span = |axis: usize| {
         let (low, high) = x.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v[axis]), h.max(v[axis])));
         let last = n[axis] as f64 - 1.0;
@@ -61,12 +61,9 @@ fn cross_lines(ids: &[u32; 3], x: &[Vec3; 3], n: &[usize; 3], lines: &mut [Cross
     for j in j0 as isize..=j1 {
         for i in i0 as isize..=i1 {
             let at = [i as f64, j as f64];
-            // Twice the signed areas of the line with each edge, the same bits from either triangle on it.
+            // Twice the signed areas of the line with each edge; the other triangle on it finds the same bits, negative.
             let area = |p: usize, q: usize| {
-                let signed = |p: usize, q: usize| {
-                    (x[p][0] - at[0]) * (x[q][1] - at[1]) - (x[p][1] - at[1]) * (x[q][0] - at[0])
-                };
-                if ids[p] < ids[q] { signed(p, q) } else { -signed(q, p) }
+                (x[p][0] - at[0]) * (x[q][1] - at[1]) - (x[p][1] - at[1]) * (x[q][0] - at[0])
             };
             let w = [area(1, 2), area(2, 0), area(0, 1)];
             let sum = w[0] + w[1] + w[2];

@@ -85,8 +85,11 @@ fn restitute_pair(
         }
         return;
     };
-    let before = bodies[owner].impacts[place].stored;
-    let stored = (meeting.stored_energy(bodies) - before).max(0.0);
+    let impact = bodies[owner].impacts[place];
+    if impact.left == 0.0 {
+        return;
+    }
+    let stored = (meeting.stored_energy(bodies) - impact.stored).max(0.0);
     let impact = &mut bodies[owner].impacts[place];
     impact.most_stored = impact.most_stored.max(stored);
     let impact = *impact;
@@ -101,7 +104,9 @@ fn restitute_pair(
     if missing <= LITTLE * wanted {
         return;
     }
-    bodies[owner].impacts[place].left -= missing;
+    let left = impact.left - missing;
+    // Spent: nothing more is asked about bodies that stay where they landed.
+    bodies[owner].impacts[place].left = if left > LITTLE * wanted { left } else { 0.0 };
     // What is pushed off stores some of it again, as it did when it was stopped.
     let given = missing / (1.0 + AGAIN * (impact.most_stored / brought).min(1.0));
     // In the step they part by as much as that is fast, against what draws them together.
