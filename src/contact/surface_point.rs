@@ -318,9 +318,19 @@ mod tests {
             let obstacle = obstacle(mesh);
             for (side, depth) in [(1.0, 1e-3), (1.0, 0.0), (1.0, -1e-3), (-1.0, 1e-3), (-1.0, -1e-3)] {
                 let p = Vec3::new(0.05, side * depth, 0.02);
-                let found = surface_point(&obstacle, &p, &Vec3::new(0.0, -side, 0.0), &SCALES).unwrap();
+                let scales = Scales { middle: Vec3::y() * side, ..SCALES };
+                let found = surface_point(&obstacle, &p, &Vec3::new(0.0, -side, 0.0), &scales).unwrap();
                 assert!((found.normal - Vec3::y() * side).norm() < 1e-6);
                 assert!((found.gap - depth).abs() < 1e-7);
+                // Crushed, it looks up from above.
+                let crushed = surface_point(&obstacle, &p, &(Vec3::y() * side), &scales).unwrap();
+                assert!(depth <= 0.0 || (crushed.normal - Vec3::y() * side).norm() < 1e-6);
+                // What it carried comes back from any depth.
+                let (deep, against) = (Vec3::new(0.05, -0.2 * side, 0.02), Vec3::y() * -side);
+                let carried = carried_point(&obstacle, &deep, &against, &scales).unwrap();
+                assert!(
+                    (carried.normal - Vec3::y() * side).norm() < 1e-6 && (carried.gap + 0.2).abs() < 1e-6
+                );
             }
         }
     }
