@@ -65,6 +65,13 @@ fn volume_is_within_one_percent_at_eight_cells_and_of_second_order() {
 }
 
 #[test]
+fn a_ball_of_eight_cells_has_about_ten_thousand_tetrahedra() {
+    let mesh = TetMesh::fill_shape(&Ball::new(0.5), 0.125).unwrap();
+    let count = mesh.tetrahedra().len();
+    assert!((7000..12000).contains(&count), "{count}");
+}
+
+#[test]
 fn boundary_vertices_are_on_the_surface() {
     for (shape, _) in curved_shapes() {
         let mesh = TetMesh::fill_shape(&*shape, 0.1).unwrap();

@@ -39,8 +39,8 @@ fn box_with_restitution_rebounds_by_it() {
     assert!((rebound / impact - 0.5).abs() < 0.025, "{rebound} of {impact} m/s");
 }
 
-/// A body without gravity thrown on a fixed floor at 2 m/s: its speed after 0.6 s and its energy then, over those at the start.
-fn bounce(builder: DeformableBodyBuilder, e_modulus: f64, dt: f32, e: f64) -> [f64; 2] {
+/// A body without gravity thrown on a fixed floor at 2 m/s: its speed after 0.6 s over that. Its energy stays below the start's.
+fn bounce(builder: DeformableBodyBuilder, e_modulus: f64, dt: f32, e: f64) -> f64 {
     let (mut physics, _) = world_with_floor(dt);
     physics.gravity = Vector::ZERO;
     let mut world = DeformableWorld::new();
@@ -61,7 +61,7 @@ fn bounce(builder: DeformableBodyBuilder, e_modulus: f64, dt: f32, e: f64) -> [f
             energy(&world) / start
         );
     }
-    [world.bodies[body].linvel()[1] / 2.0, energy(&world) / start]
+    world.bodies[body].linvel()[1] / 2.0
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn rebound_grows_with_restitution_and_never_exceeds_the_impact() {
     for (shape, builder) in shapes.into_iter().enumerate() {
         for e_modulus in [3e4, 1e5, 1e6, 1e8] {
             for dt in [1.0 / 60.0, 1.0 / 240.0] {
-                let rebounds = [0.0, 0.25, 0.5, 0.75, 1.0].map(|e| bounce(builder(), e_modulus, dt, e)[0]);
+                let rebounds = [0.0, 0.25, 0.5, 0.75, 1.0].map(|e| bounce(builder(), e_modulus, dt, e));
                 println!("shape {shape}, {e_modulus:.0e} Pa, {dt:.4} s: {rebounds:.2?}");
                 let grows = rebounds.windows(2).all(|r| r[1] > r[0] - 0.01);
                 assert!(

@@ -41,10 +41,16 @@ pub(crate) fn side_of_node(
     motion.try_normalize(1e-12).or_else(|| towards.try_normalize(0.0)).unwrap_or_else(|| -Vec3::y())
 }
 
-/// Against the normal that carried a node in the last step, in the obstacle's frame, if one did.
+/// Against the normal that carried a node in the last step, in the obstacle's frame, if one did; `memory` are the last step's
+/// contacts with the obstacle, ascending by key.
 pub(crate) fn against_carried(obstacle: &Obstacle, node: u32, memory: &[ConstraintMemory]) -> Option<Vec3> {
-    let own = |m: &&ConstraintMemory| matches!(m.key, ConstraintKey::Obstacle(c) if c.feature == Feature::Node(node));
-    let carried = memory.iter().find(own)?;
+    let feature = |m: &ConstraintMemory| match m.key {
+        ConstraintKey::Obstacle(contact) => Some(contact.feature),
+        _ => None,
+    };
+    let own = Some(Feature::Node(node));
+    let place = memory.partition_point(|m| feature(m) < own);
+    let carried = memory.get(place).filter(|m| feature(m) == own)?;
     Some(-obstacle.start.rotation.tr_mul(&carried.geometry.frame[0]))
 }
 

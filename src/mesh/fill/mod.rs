@@ -42,7 +42,7 @@ impl TetMesh {
     /// 0.72 cells inside, the boundary's vertices on the surface, its creases and corners kept where they turn by
     /// more than 30°. Where parts are thinner than a cell, all cells are halved, twice at the most. The volume is that of
     /// the surface to second order in the cell: 1 % at eight cells across a ball. Dihedral angles are between 15° and
-    /// 155° in what was tried (docs/meshes.md). Surfaces that overlap are filled as one.
+    /// 151° in smooth shapes, down to 8° between sharp edges (docs/meshes.md). Surfaces that overlap are filled as one.
     ///
     /// Method: isosurface stuffing \[Labelle Shewchuk 2007\].
     ///
@@ -127,9 +127,10 @@ fn lattice_of(half_extents: [f32; 3], cell_size: f32) -> Result<TetMesh, MeshErr
 /// Fills with cells of this size, or smaller ones where they hold too little or too much.
 fn fill(domain: &Domain, cell_size: f32) -> Result<TetMesh, MeshError> {
     let extents = domain.high - domain.low;
-    let mut filled = 0.0;
+    let (mut filled, mut tried) = (0.0, cell_size);
     for halving in 0..=HALVINGS {
-        let cube = CUBE * f64::from(cell_size) / f64::from(1 << halving);
+        let size = cell_size / (1 << halving) as f32;
+        let cube = CUBE * f64::from(size);
         let cubes: f64 = extents.iter().map(|e| (e / cube).ceil() + 2.0).product();
         if !(cube > 0.0 && cubes <= MOST_CUBES) {
             if halving > 0 {
@@ -142,7 +143,7 @@ fn fill(domain: &Domain, cell_size: f32) -> Result<TetMesh, MeshError> {
         let (is_inside, overlaps) = domain.inside(&lattice);
         let mut draft = Draft::new(stuffing::stuff(domain, &lattice, &is_inside), domain);
         snapping::snap_to_creases(&mut draft, domain, cube);
-        filled = draft.volume();
+        (filled, tried) = (draft.volume(), size);
         // What overlaps is enclosed more than once.
         if filled > 0.0 && (overlaps || (filled / domain.volume - 1.0).abs() < OFF) {
             finish(&mut draft, domain, cube);
@@ -150,8 +151,7 @@ fn fill(domain: &Domain, cell_size: f32) -> Result<TetMesh, MeshError> {
             return TetMesh::new(points, draft.tetrahedra);
         }
     }
-    let cell_size = cell_size / (1 << HALVINGS) as f32;
-    Err(MeshError::TooThin { cell_size, volume: domain.volume, filled })
+    Err(MeshError::TooThin { cell_size: tried, volume: domain.volume, filled })
 }
 
 /// Mends tetrahedra and what still lies across a crease, in turn.

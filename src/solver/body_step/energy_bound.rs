@@ -49,10 +49,9 @@ impl BodyProblem {
         RigidMotion::of(&self.x_start, &self.v_start, &self.masses)
     }
 
-    /// Velocity that external forces give to the centre of mass in the step [m/s].
-    pub fn free_fall(&self) -> Vec3 {
+    /// Velocity that external forces give in the step to the centre of mass, which so moves at its start [m/s].
+    pub fn free_fall(&self, motion: &RigidMotion) -> Vec3 {
         let (_, led_to) = centre_of_mass(&self.target, &self.masses);
-        let motion = self.rigid_motion();
         (led_to - motion.centre) / self.h - motion.velocity
     }
 

@@ -73,31 +73,31 @@ fn restitute_pair(
     context: &SolveContext<'_>,
 ) {
     let (owner, partner, _) = pair[0];
+    let place = bodies[owner].impacts.iter().position(|i| i.partner == partner);
+    // Spent: nothing more is asked about bodies that stay where they landed.
+    if place.is_some_and(|place| bodies[owner].impacts[place].left == 0.0) {
+        return;
+    }
     let contacts = pair.iter().map(|t| &candidates[t.2].constraint);
     let Some(meeting) = Meeting::of(contacts, bodies, context).filter(|m| m.mobility > 0.0) else { return };
-    let Some(place) = bodies[owner].impacts.iter().position(|i| i.partner == partner) else {
+    let e = candidates[pair[0].2].constraint.restitution;
+    let Some(place) = place else {
         let approach = -meeting.departure;
         if approach > context.limits.restitution_threshold {
-            let e = candidates[pair[0].2].constraint.restitution;
             let left = e * e * approach * approach / (2.0 * meeting.mobility);
             let stored = meeting.stored_energy(bodies);
             bodies[owner].impacts.push(Impact { partner, approach, stored, most_stored: 0.0, left });
         }
         return;
     };
-    let impact = bodies[owner].impacts[place];
-    if impact.left == 0.0 {
-        return;
-    }
+    let mut impact = bodies[owner].impacts[place];
     let stored = (meeting.stored_energy(bodies) - impact.stored).max(0.0);
-    let impact = &mut bodies[owner].impacts[place];
     impact.most_stored = impact.most_stored.max(stored);
-    let impact = *impact;
+    bodies[owner].impacts[place] = impact;
     let brought = impact.approach.powi(2) / (2.0 * meeting.mobility);
     if meeting.departure < -STOPPED * impact.approach || stored > RELEASED * brought {
         return;
     }
-    let e = candidates[pair[0].2].constraint.restitution;
     let had = meeting.departure.max(0.0).powi(2) / (2.0 * meeting.mobility);
     let wanted = e * e * brought;
     let missing = (wanted - had - stored).min(impact.left);
@@ -105,7 +105,6 @@ fn restitute_pair(
         return;
     }
     let left = impact.left - missing;
-    // Spent: nothing more is asked about bodies that stay where they landed.
     bodies[owner].impacts[place].left = if left > LITTLE * wanted { left } else { 0.0 };
     // What is pushed off stores some of it again, as it did when it was stopped.
     let given = missing / (1.0 + AGAIN * (impact.most_stored / brought).min(1.0));
@@ -179,7 +178,7 @@ impl Meeting {
                     if let Some(motion) = &motion {
                         own = motion.at(&point);
                         meeting.mobility += motion.mobility(&point, &normal);
-                        gained = problem.free_fall();
+                        gained = problem.free_fall(motion);
                     }
                     meeting.soft[k] = Some((*body, motion));
                 }
