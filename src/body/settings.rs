@@ -233,9 +233,9 @@ pub struct SolverSettings {
     pub precision: FactorPrecision,
     /// Time integration.
     pub integrator: Integrator,
-    /// Whether a body in free flight keeps its spin. Implicit Euler loses it, 42 % in a second at 10 rad/s and
-    /// steps of 1/100 s: what it lost is given back after the step, as a rotation of the velocities. On by
-    /// default; a body that is pinned, attached or touched is left alone.
+    /// Whether a body keeps its spin. Implicit Euler loses it, 42 % in a second at 10 rad/s and steps of 1/100 s: what it lost
+    /// is given back after the step, as a rotation of the velocities, in flight and in contact. On by default; a body that is
+    /// pinned is left alone.
     pub keeps_spin: bool,
 }
 
@@ -324,7 +324,7 @@ impl SolverSettings {
         Self { integrator, ..self }
     }
 
-    /// Sets whether a body in free flight keeps its spin.
+    /// Sets whether a body keeps its spin.
     #[must_use]
     pub fn keeps_spin(self, keeps_spin: bool) -> Self {
         Self { keeps_spin, ..self }

@@ -20,7 +20,6 @@ impl BodyProblem {
     /// Chooses where the iteration starts, and the frames of the preconditioner: the rigidly extrapolated
     /// shape or the inertial target, whichever has the lower Ψ; of a pinned body where it is, if that has much less.
     pub fn choose_initial_guess(&mut self, factor: &SystemFactor) {
-        let model = self.model.clone();
         let is_pinned = !self.key.pins.is_empty();
         if is_pinned {
             // What is pinned does not fall: by its motion alone, so that what hangs still starts where it is.
@@ -29,13 +28,9 @@ impl BodyProblem {
             self.force.extend(drift);
             self.key.pins.iter().for_each(|&p| self.force[p as usize] = self.target[p as usize]);
         }
-        let goes_to = if is_pinned { &self.force } else { &self.target };
-        let (turned, _, centre) = floating_frame(&model, goes_to);
-        let (before, _, centre_before) = floating_frame(&model, &self.x_start);
-        let turn = turned * before.transpose();
-        self.current.x.clear();
-        let carried = self.x_start.iter().map(|x| centre + turn * (x - centre_before));
-        self.current.x.extend(carried);
+        let goes_to = std::mem::take(if is_pinned { &mut self.force } else { &mut self.target });
+        let turned = self.carry_start_to(&goes_to);
+        *if is_pinned { &mut self.force } else { &mut self.target } = goes_to;
         if is_pinned {
             // Shift so that the pinned nodes fit on average, then put them where they belong.
             let miss = |&p: &u32| self.target[p as usize] - self.current.x[p as usize];
@@ -58,6 +53,16 @@ impl BodyProblem {
             }
         }
         self.choose_frames(&turned, factor);
+    }
+
+    /// Sets the current positions to the start's, carried as a rigid body to these; gives the frame there.
+    pub(super) fn carry_start_to(&mut self, goes_to: &[Vec3]) -> Mat3 {
+        let (turned, _, centre) = floating_frame(&self.model, goes_to);
+        let (before, _, centre_before) = floating_frame(&self.model, &self.x_start);
+        let turn = turned * before.transpose();
+        self.current.x.clear();
+        self.current.x.extend(self.x_start.iter().map(|x| centre + turn * (x - centre_before)));
+        turned
     }
 
     /// Evaluates the trial positions and makes them the current ones if their Ψ is below a limit \[J\], or the present one is no

@@ -17,9 +17,11 @@ pub(crate) struct Factors<'a> {
 }
 
 impl<'a> Factors<'a> {
-    /// Whether the columns of the body's inverse that its contacts want are there.
+    /// Whether the columns of the body's inverse that its contacts want are there, or none are needed.
     pub fn has_columns(&self, index: usize, body: &BodyProblem) -> bool {
-        body.has_columns || self.newton.made.get(index).is_some_and(Option::is_some)
+        body.has_columns
+            || body.preconditioner.is_rigid()
+            || self.newton.made.get(index).is_some_and(Option::is_some)
     }
 
     /// The factor of the island's body `index`.

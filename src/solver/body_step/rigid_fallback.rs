@@ -61,20 +61,26 @@ impl BodyProblem {
         gained
     }
 
-    /// Rejects the step: sets the trial to where the body goes in its shape under the present contact forces, from
-    /// where it was at the start.
+    /// Rejects the step: sets the trial to where the body goes in its shape under the present contact forces. A free one
+    /// first turns as it would without them: about where it was at the start, contacts would miss by the square of its turn.
     pub fn begin_rigid_fallback(&mut self, factor: &SystemFactor) {
-        self.current.x.clone_from(&self.x_start);
-        self.key.pins.iter().for_each(|&p| self.current.x[p as usize] = self.target[p as usize]);
         let mut forces = std::mem::take(&mut self.force);
         forces.clone_from(&self.contact_force);
         if self.key.pins.is_empty() {
-            self.preconditioner.set_rigid(&self.x_start, &self.masses, self.mobility());
+            let target = std::mem::take(&mut self.target);
+            self.carry_start_to(&target);
+            self.target = target;
+            self.preconditioner.set_rigid(&self.current.x, &self.masses, self.mobility());
             self.step_damping = 1.0;
+            // Drag resists all of the way, also what is gone already.
+            let [to_target, gone] = [1.0 / (self.h * self.h), 1.0 / self.mobility()];
             for (i, force) in forces.iter_mut().enumerate() {
-                *force += (self.target[i] - self.x_start[i]) * (self.masses[i] / (self.h * self.h));
+                let [target, x] = [self.target[i], self.current.x[i]].map(|x| x - self.x_start[i]);
+                *force += (target * to_target - x * gone) * self.masses[i];
             }
         } else {
+            self.current.x.clone_from(&self.x_start);
+            self.key.pins.iter().for_each(|&p| self.current.x[p as usize] = self.target[p as usize]);
             self.step_damping = STIFFENING;
         }
         self.step_by(factor, &forces);

@@ -226,7 +226,7 @@ impl Preconditioner {
 
     /// `out = P r`: displacements \[m\] of forces \[N\].
     pub fn apply(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
-        if self.kind == FrameKind::Rigid {
+        if self.is_rigid() {
             return self.rigid.apply(r, out);
         }
         if !self.deflation.active {
@@ -278,7 +278,12 @@ impl Preconditioner {
     /// Whether the body moves as P without more than frames around the inverse: no rigid shape, no deflation, nothing of
     /// another step.
     pub fn is_framed(&self) -> bool {
-        self.kind != FrameKind::Rigid && !self.deflation.active && !self.drifts
+        !self.is_rigid() && !self.deflation.active && !self.drifts
+    }
+
+    /// Whether the body moves as a rigid one.
+    pub fn is_rigid(&self) -> bool {
+        self.kind == FrameKind::Rigid
     }
 
     /// The frame of a node.
@@ -291,14 +296,18 @@ impl Preconditioner {
     }
 
     /// The block of the inverse between two nodes in the frame of the matrix [m/N], by their `places` on the surface.
+    /// Zero where the body moves as a rigid one, which takes no columns.
     pub fn inverse_block(&self, factor: &SystemFactor, places: [usize; 2], nodes: [usize; 2]) -> Mat3 {
+        if self.is_rigid() {
+            return Mat3::zeros();
+        }
         let block = factor.columns.block(places[0], places[1]);
         if self.drifts { block + self.drift.compliance(nodes[0], nodes[1]) } else { block }
     }
 
     /// The block of P between two surface nodes, given the one of the inverse [m/N].
     pub fn compliance(&self, factor: &SystemFactor, inverse_block: &Mat3, i: usize, j: usize) -> Mat3 {
-        if self.kind == FrameKind::Rigid {
+        if self.is_rigid() {
             return self.rigid.compliance(i, j);
         }
         let block = match self.kind {
