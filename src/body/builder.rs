@@ -110,7 +110,6 @@ impl DeformableBodyBuilder {
     }
 
     /// A Gmsh file, see [`TetMesh::read_gmsh`].
-    #[cfg(feature = "gmsh")]
     pub fn gmsh(path: impl AsRef<std::path::Path>) -> Self {
         Self::from_mesh(TetMesh::read_gmsh(path))
     }

@@ -3,7 +3,6 @@
 //! Architecture invariant: nothing here knows materials, time or rapier's sets.
 
 mod fill;
-#[cfg(feature = "gmsh")]
 mod gmsh;
 mod lattice;
 mod mesh_error;

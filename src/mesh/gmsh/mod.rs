@@ -1,0 +1,80 @@
+//! Gmsh `.msh` files.
+
+mod sections;
+mod source;
+
+use super::mesh_error::MeshError;
+use super::tet_mesh::TetMesh;
+use sections::Grid;
+use std::collections::HashMap;
+use std::path::Path;
+
+impl TetMesh {
+    /// Reads the linear tetrahedra of a Gmsh `.msh` file, formats 2.0 to 2.2, 4.0 and 4.1, text or binary. Elements of other
+    /// kinds are passed over, and so are nodes that no tetrahedron has; coordinates are taken as metres. Vertices are in
+    /// the order in which tetrahedra first name them. Negatively oriented tetrahedra are turned round, which Gmsh leaves to its
+    /// readers.
+    ///
+    /// # Errors
+    /// [`MeshError::File`] with line, section and reason when the file cannot be read, else as [`TetMesh::new`].
+    ///
+    /// ```
+    /// use foible3d::TetMesh;
+    /// let file = std::env::temp_dir().join("foible3d-corner.msh");
+    /// let text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n\
+    ///     $Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n\
+    ///     $Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n";
+    /// std::fs::write(&file, text)?;
+    /// assert_eq!(TetMesh::read_gmsh(&file)?.tetrahedra(), [[0, 1, 2, 3]]);
+    ///
+    /// std::fs::write(&file, text.replace("0 1 0", "0 one 0"))?;
+    /// let error = TetMesh::read_gmsh(&file).unwrap_err().to_string();
+    /// assert!(error.ends_with("line 8, $Nodes: `one` is no such number"), "{error}");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn read_gmsh(path: impl AsRef<Path>) -> Result<Self, MeshError> {
+        let path = path.as_ref();
+        let fail = |reason: String| MeshError::File { path: path.display().to_string(), reason };
+        let bytes = std::fs::read(path).map_err(|e| fail(e.to_string()))?;
+        let grid = sections::read(&bytes).map_err(fail)?;
+        let (vertices, tetrahedra) = geometry(&grid).map_err(fail)?;
+        TetMesh::new(vertices, tetrahedra)
+    }
+}
+
+type Geometry = (Vec<[f64; 3]>, Vec<[u32; 4]>);
+
+/// Vertices and tetrahedra by indices.
+fn geometry(grid: &Grid) -> Result<Geometry, String> {
+    if grid.tetrahedra.is_empty() {
+        let others: Vec<String> =
+            grid.others.iter().map(|(kind, count)| format!("{count} of type {kind}")).collect();
+        let others = if others.is_empty() { "no elements".to_owned() } else { others.join(", ") };
+        return Err(format!("no linear tetrahedra (element type 4) in the file: {others}"));
+    }
+    let mut vertices = Vec::new();
+    let mut index_of_tag = HashMap::new();
+    let mut tetrahedra = Vec::with_capacity(grid.tetrahedra.len());
+    for (element, nodes) in &grid.tetrahedra {
+        let mut tet = [0; 4];
+        for (corner, tag) in tet.iter_mut().zip(nodes) {
+            let position = grid.positions.get(tag);
+            let position = position
+                .ok_or_else(|| format!("element {element} refers to node {tag}, which is not there"))?;
+            *corner = *index_of_tag.entry(*tag).or_insert_with(|| {
+                vertices.push(*position);
+                vertices.len() as u32 - 1
+            });
+        }
+        tetrahedra.push(positively_oriented(tet, &vertices));
+    }
+    Ok((vertices, tetrahedra))
+}
+
+fn positively_oriented(mut tet: [u32; 4], vertices: &[[f64; 3]]) -> [u32; 4] {
+    let corners = tet.map(|i| vertices[i as usize].into());
+    if super::tet_mesh::signed_volume(&corners) < 0.0 {
+        tet.swap(2, 3);
+    }
+    tet
+}
