@@ -138,6 +138,26 @@ fn rods_and_sheets_bend_as_beams_do() {
 }
 
 #[test]
+fn stiff_strips_come_to_rest_where_the_converged_do() {
+    for e in [1e6, 1e8, 1e9] {
+        let strip = || {
+            DeformableBodyBuilder::cloth([0.25, 0.025], [40, 4], 1e-3)
+                .material(DeformableMaterial::new(e, 0.3).mass_damping(2.0))
+                .pinned(|x| x.x < -0.25 + 0.0126)
+        };
+        let newton = SolverSettings::default().solver(Solver::Newton).tolerance(1e-8).max_iterations(50);
+        let [found, truth] = [strip(), strip().settings(newton)].map(|strip| {
+            let (world, body) = settle(strip, 1.0 / 60.0, 12.0);
+            let body = &world.bodies[body];
+            (mean_position(body, &at_rest_where(body, |p| p[0] > 0.2499)), body.max_speed())
+        });
+        let off = (0..3).map(|k| (found.0[k] - truth.0[k]).powi(2)).sum::<f64>().sqrt();
+        println!("{e:.0e} Pa: tip off by {off:.1e} m, {:.1e} m/s", found.1);
+        assert!(off < 1e-4 && found.1 < 1e-5, "{e:e} Pa: {off} m, {} m/s", found.1);
+    }
+}
+
+#[test]
 fn hanging_cloth_has_the_shape_that_newtons_method_finds() {
     let cotton = DeformableMaterial::new(1e6, 0.3).density(400.0).mass_damping(4.0);
     let cloth = || {

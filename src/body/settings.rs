@@ -142,6 +142,8 @@ impl Build {
             Self::Solid => defaults,
             // Their largest force is at the pins, hundreds of times that on other nodes.
             Self::Sheet => SolverSettings { system: SystemMatrix::Laplacian, tolerance: 1.0e-3, ..defaults },
+            // The constant matrix leaves stiff ones swaying for half a minute, and rejects what lies on a floor in every step.
+            Self::SmallSheet => SolverSettings { solver: Solver::Newton, max_iterations: 3, ..defaults },
             Self::Rope => SolverSettings { solver: Solver::Newton, ..defaults },
         }
     }

@@ -65,9 +65,15 @@ pub(crate) enum Build {
     Solid,
     /// Sheets or springs.
     Sheet,
+    /// Such of few vertices.
+    SmallSheet,
     /// Nothing but rods.
     Rope,
 }
+
+/// Most vertices of a sheet that is solved by Newton's method if nothing else is asked for: it takes 1.6 to 2.2 times as long in
+/// a strip of 205 vertices, a third in a cloth of 169 on a floor, four times as long in one of 441 that hangs, nine in one of 1681.
+const SMALL_SHEET: usize = 256;
 
 static NEXT_ID: AtomicU64 = AtomicU64::new(1);
 
@@ -214,6 +220,7 @@ impl DeformableModel {
     pub(crate) fn build(&self) -> Build {
         match (self.is_solid(), self.surface.triangles.is_empty()) {
             (true, _) => Build::Solid,
+            (false, false) if self.vertex_count() <= SMALL_SHEET => Build::SmallSheet,
             (false, false) => Build::Sheet,
             (false, true) => Build::Rope,
         }

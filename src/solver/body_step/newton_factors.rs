@@ -7,6 +7,7 @@ use crate::contact::{Constraint, Endpoint};
 use crate::fem::SystemMatrix;
 use crate::solver::linear::{
     CoarseInverse, ComplianceColumns, FactorCache, FactorScratch, Symbolic, SystemFactor, assemble_tangent,
+    columns_pay,
 };
 
 /// Factors of an island's bodies: their own where they have such, else those of the cache.
@@ -19,24 +20,29 @@ pub(crate) struct Factors<'a> {
 impl<'a> Factors<'a> {
     /// Whether the columns of the body's inverse that its contacts want are there, or none are needed.
     pub fn has_columns(&self, index: usize, body: &BodyProblem) -> bool {
-        body.has_columns
-            || body.preconditioner.is_rigid()
-            || self.newton.made.get(index).is_some_and(Option::is_some)
+        let own = self.newton.made.get(index).and_then(Option::as_ref);
+        body.preconditioner.is_rigid() || own.map_or(body.has_columns, |own| own.has_columns)
     }
 
     /// The factor of the island's body `index`.
     pub fn of(&self, index: usize, body: &BodyProblem) -> &'a SystemFactor {
         let own = self.newton.made.get(index).and_then(Option::as_ref);
-        own.unwrap_or_else(|| self.cache.get(body.factor))
+        own.map_or_else(|| self.cache.get(body.factor), |own| &own.factor)
     }
 }
 
 /// The factors that the bodies of an island have made themselves.
 #[derive(Default)]
 pub(crate) struct NewtonFactors {
-    made: Vec<Option<SystemFactor>>,
+    made: Vec<Option<OwnFactor>>,
     count: u64,
     scratch: FactorScratch,
+}
+
+struct OwnFactor {
+    factor: SystemFactor,
+    /// All columns that its contacts want are there.
+    has_columns: bool,
 }
 
 impl NewtonFactors {
@@ -74,7 +80,7 @@ impl NewtonFactors {
         body: &BodyProblem,
         symbolic: &std::sync::Arc<Symbolic>,
         constraints: impl Iterator<Item = &'a Constraint>,
-    ) -> Option<SystemFactor> {
+    ) -> Option<OwnFactor> {
         let (factor, coarse) = [false, true].into_iter().find_map(|projected| {
             let (x, pins) = (&body.current.x, &body.key.pins);
             let values = assemble_tangent(&body.elements(), x, projected, pins, body.h(), symbolic);
@@ -87,10 +93,16 @@ impl NewtonFactors {
             .flat_map(|constraint| &constraint.endpoints)
             .filter(|endpoint| endpoint.is_of(index))
             .flat_map(Endpoint::soft_nodes);
-        let nodes = nodes.map(|(node, _)| surface.index_of_node[node]);
-        columns.prepare(&body.model, &body.key.pins, symbolic, &factor, nodes, &mut self.scratch);
+        let mut nodes: Vec<u32> = nodes.map(|(node, _)| surface.index_of_node[node]).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let has_columns = columns_pay(symbolic, &factor, &body.model, nodes.len());
+        if has_columns {
+            let nodes = nodes.into_iter();
+            columns.prepare(&body.model, &body.key.pins, symbolic, &factor, nodes, &mut self.scratch);
+        }
         self.count += 1;
-        Some(SystemFactor {
+        let factor = SystemFactor {
             symbolic: symbolic.clone(),
             factor: std::sync::Arc::new(factor),
             system: SystemMatrix::RestStiffness,
@@ -98,6 +110,7 @@ impl NewtonFactors {
             clusters: None,
             coarse,
             serial: u64::MAX - self.count,
-        })
+        };
+        Some(OwnFactor { factor, has_columns })
     }
 }

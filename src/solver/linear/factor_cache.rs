@@ -355,7 +355,12 @@ impl FactorCache {
 }
 
 /// Whether as many nodes are worth their columns.
-fn columns_pay(symbolic: &Symbolic, factor: &Factor, model: &DeformableModel, nodes: usize) -> bool {
+pub(crate) fn columns_pay(
+    symbolic: &Symbolic,
+    factor: &Factor,
+    model: &DeformableModel,
+    nodes: usize,
+) -> bool {
     let numbers = match factor {
         Factor::Iterative(_) => ITERATIVE * model.rest.len(),
         _ => symbolic.factor_len(),

@@ -34,7 +34,7 @@ pub(crate) use compliance_columns::ComplianceColumns;
 pub(crate) use factor::{FactorScratch, Symbolic};
 pub(crate) use rigid_mode::rigid_mobility;
 
-pub(crate) use factor_cache::{FactorCache, FactorId, SystemFactor};
+pub(crate) use factor_cache::{FactorCache, FactorId, SystemFactor, columns_pay};
 pub(crate) use preconditioner::{BlockForm, Preconditioner};
 pub(crate) use system::{FactorKey, assemble_tangent};
 pub(crate) use unused_factors::STEPS_KEPT;
