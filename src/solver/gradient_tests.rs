@@ -1,10 +1,7 @@
 //! Projected gradients against the optimum, and wherever they are stopped.
 
-use super::cone::{
-    ConeMetric, ConeOperator, ConeProblem, ConeTolerance, MetricContact, MetricSide, Modes, ProjectedGradient,
-};
+use super::cone::{ConeMetric, ConeOperator, ConeProblem, ConeTolerance, MetricContact, ProjectedGradient};
 use super::tests::{brute_force, objective, random_problem};
-use crate::math::lanes::Lane;
 use proptest::prelude::*;
 
 struct Dense<'a>(&'a ConeProblem);
@@ -61,42 +58,5 @@ proptest! {
         let (found, best) = (objective(&problem, &solve(&problem, 3000)), objective(&problem, &brute_force(&problem)));
         // A slow tail where contacts are redundant (rank 4 of 12 rows: 6e-5), which Newton's method is for.
         prop_assert!(found <= best + 1e-3 * (1.0 + best.abs()), "{found} against {best}");
-    }
-}
-
-/// One body whose modes move its contacts by `scale` times random numbers, and D of the same problem.
-fn with_modes(problem: &ConeProblem, scale: f64, D: f64, numbers: &[f64]) -> ConeMetric {
-    let at = |k: usize| scale * numbers[k % numbers.len()];
-    let modes =
-        |k: usize| -> Modes { std::array::from_fn(|l| Lane(std::array::from_fn(|m| at(7 * k + 4 * l + m)))) };
-    let contact = |i: usize| MetricContact {
-        law: problem.laws[i],
-        first: 3 * i,
-        dimension: 3,
-        D,
-        sides: [Some(MetricSide { body: 0, rows: std::array::from_fn(|k| modes(3 * i + k)) }), None],
-    };
-    let mut metric = ConeMetric::default();
-    metric.bodies = 1;
-    metric.filled.push((0, 0));
-    metric.contacts.extend((0..problem.contacts()).map(contact));
-    metric.index_columns();
-    metric
-}
-
-proptest! {
-    #[test]
-    fn no_solve_ends_before_its_budget_and_its_aim(
-        contacts in 2usize..5, mu in 0.1..1.0f64, scale in -2.0..1.5f64, D in -6.0..0.0f64,
-        numbers in proptest::collection::vec(-1.0..1.0f64, 60),
-    ) {
-        let problem = random_problem(contacts, 12, mu, &numbers);
-        let metric = with_modes(&problem, 10f64.powf(scale), 10f64.powf(D), &numbers);
-        let (mut z, mut r) = (vec![0.0; problem.rows()], problem.g.clone());
-        let mut method = ProjectedGradient::default();
-        method.begin();
-        let tolerance = ConeTolerance { relative: 1e-3, floor: 1e-3 };
-        let work = method.solve(&metric, [&mut z, &mut r], tolerance, 10, &mut Dense(&problem));
-        prop_assert!(work.error <= tolerance.relative || work.products == 10, "{} after {}", work.error, work.products);
     }
 }

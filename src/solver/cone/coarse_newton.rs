@@ -215,12 +215,6 @@ impl CoarseNewton {
         }
     }
 
-    /// The same for bodies whose modes do not move: a projected gradient.
-    pub fn step_without_modes(&mut self, problem: &CoarseProblem<'_>, [d, Vp]: [&mut Vec<f64>; 2]) {
-        self.p.fill(STILL);
-        project(problem, &self.p, &mut self.u, &mut self.gradient, [d, Vp]);
-    }
-
     fn factorize(&mut self, problem: &CoarseProblem<'_>) -> bool {
         let metric = problem.metric;
         self.starts.clear();

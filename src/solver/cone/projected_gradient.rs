@@ -59,14 +59,7 @@ impl ProjectedGradient {
         while work.error > tolerance.relative && work.products < budget {
             let problem = CoarseProblem { metric, z, r, alpha: self.alpha };
             self.coarse.solve(&problem, [&mut self.d, &mut self.VVd]);
-            let mut slope = product(r, &self.d);
-            let is_coarse = slope < 0.0;
-            if !is_coarse {
-                // What a coarse problem that was left too early ends at need not descend; a step without it does.
-                self.coarse.step_without_modes(&problem, [&mut self.d, &mut self.VVd]);
-                slope = product(r, &self.d);
-            }
-            // Written so that NaN ends it.
+            let slope = product(r, &self.d);
             if !(slope < 0.0) {
                 break;
             }
@@ -79,9 +72,7 @@ impl ProjectedGradient {
                 r[k] += t * self.Wd[k];
             }
             operator.advance(t);
-            if is_coarse {
-                self.choose_alpha(metric, work.products);
-            }
+            self.choose_alpha(metric, work.products);
             work.error = metric.error(z, r, tolerance);
         }
         work
