@@ -3,6 +3,8 @@
 //! Time per element beside the number of elements, bytes per second of the solves beside those of a
 //! memory copy, memory per body, and what many equal bodies cost on one and on all threads.
 
+#[path = "shared/clock.rs"]
+mod clock;
 mod shared;
 
 use foible3d::prelude::*;
@@ -243,13 +245,7 @@ fn cloth_on_ball(cells: usize, solver: Option<Solver>) -> [f64; 2] {
     };
     let mut world = DeformableWorld::new();
     world.insert(cloth.can_sleep(false)).expect("a valid cloth");
-    let times: Vec<f64> = (0..60)
-        .map(|_| {
-            let start = Instant::now();
-            world.step(&mut physics);
-            start.elapsed().as_secs_f64() * 1e3
-        })
-        .collect();
+    let times: Vec<f64> = (0..60).map(|_| clock::timed(|| world.step(&mut physics)).1).collect();
     [times.iter().sum::<f64>() / 60.0, times.iter().copied().fold(0.0, f64::max)]
 }
 
@@ -279,7 +275,7 @@ fn main() {
         return in_pool(1, bigs);
     }
     energies();
-    cloths();
+    in_pool(1, cloths);
     println!("one thread: elements and solves");
     in_pool(1, || {
         for cells in [[11, 3, 3], [32, 5, 5], [49, 9, 9]] {

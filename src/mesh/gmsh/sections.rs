@@ -109,13 +109,7 @@ fn read_nodes(source: &mut Source<'_>, grid: &mut Grid, are_parametric: bool) ->
 }
 
 fn read_node_blocks(source: &mut Source<'_>, grid: &mut Grid, version: Version) -> Result<(), String> {
-    let blocks = source.count()?;
-    source.count()?;
-    if version == Version::FourOne {
-        source.size()?;
-        source.size()?;
-    }
-    for _ in 0..blocks {
+    for _ in 0..read_block_count(source, version)? {
         let dimension = read_entity(source, version)?;
         let parameters = if source.int()? == 0 { 0 } else { dimension };
         let count = source.count()?;
@@ -162,13 +156,7 @@ fn read_elements(source: &mut Source<'_>, grid: &mut Grid) -> Result<(), String>
 }
 
 fn read_element_blocks(source: &mut Source<'_>, grid: &mut Grid, version: Version) -> Result<(), String> {
-    let blocks = source.count()?;
-    source.count()?;
-    if version == Version::FourOne {
-        source.size()?;
-        source.size()?;
-    }
-    for _ in 0..blocks {
+    for _ in 0..read_block_count(source, version)? {
         read_entity(source, version)?;
         let kind = source.int()?;
         for _ in 0..source.count()? {
@@ -229,6 +217,17 @@ fn pass_over(source: &mut Source<'_>, grid: &mut Grid, kind: i64, width: Width) 
         };
     }
     Ok(())
+}
+
+/// How many blocks follow; of how many nodes or elements, and with which tags, is passed over.
+fn read_block_count(source: &mut Source<'_>, version: Version) -> Result<i64, String> {
+    let blocks = source.count()?;
+    source.count()?;
+    if version == Version::FourOne {
+        source.size()?;
+        source.size()?;
+    }
+    Ok(blocks)
 }
 
 /// The dimension of the entity that a block belongs to.
