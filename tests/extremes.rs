@@ -31,7 +31,7 @@ struct Found {
 
 /// A soft cube of 5 cm (as E = 1e3 wants) thrown on a fixed floor, with a rigid box on top of it that
 /// moves along.
-fn throw(c: Corner) -> Found {
+fn throw(c: Corner, integrator: Integrator) -> Found {
     let (mut physics, _) = world_with_floor(c.dt);
     let mut world = DeformableWorld::new();
     let half = 0.025f32;
@@ -40,7 +40,7 @@ fn throw(c: Corner) -> Found {
         .translation(Vector::Y * (half + 0.01))
         .linvel(Vector::Y * -c.speed)
         .material(DeformableMaterial::new(c.e, c.nu).friction(MU))
-        .settings(SolverSettings::iterations(c.iterations));
+        .settings(SolverSettings::iterations(c.iterations).integrator(integrator));
     let soft = world.insert(soft).unwrap();
     let mass = c.ratio * world.bodies[soft].mass();
     let shape = ColliderBuilder::cuboid(half, half, half).mass(mass as f32).friction(MU as f32);
@@ -140,8 +140,8 @@ fn print_table(corners: &[Corner], thrown: &[Found]) {
     println!("{} corners", corners.len());
 }
 
-fn make_no_energy_and_stay_above_the_floor(corners: &[Corner]) {
-    let thrown: Vec<Found> = corners.par_iter().map(|c| throw(*c)).collect();
+fn make_no_energy_and_stay_above_the_floor(corners: &[Corner], integrator: Integrator) {
+    let thrown: Vec<Found> = corners.par_iter().map(|c| throw(*c, integrator)).collect();
     print_table(corners, &thrown);
     for (c, f) in corners.iter().zip(&thrown) {
         assert!(f.finite, "{c:?}: {f:?}");
@@ -151,25 +151,38 @@ fn make_no_energy_and_stay_above_the_floor(corners: &[Corner]) {
         assert!(f.excess < 1e-6, "{c:?}: {f:?}");
         // What a body of this stiffness can carry, in steps of a game.
         let carries = c.e >= 1e6 && c.dt < 0.02 && c.speed == 0.0;
-        assert!(!carries || f.lowest > 0.0 && f.rejected == 0, "{c:?}: {f:?}");
+        // Without the damping of implicit Euler a load that is set down goes twice as deep as it rests.
+        let is_damped = integrator == Integrator::ImplicitEuler;
+        assert!(!carries || f.lowest > 0.0 && (f.rejected == 0 || !is_damped), "{c:?}: {f:?}");
         assert!(f.growth < if c.iterations == 1 { 2e-2 } else { 2e-3 }, "{c:?}: {f:?}");
     }
 }
 
 #[test]
 fn no_corner_of_a_spread_sixth_makes_energy_or_goes_through_the_floor() {
+    make_no_energy_and_stay_above_the_floor(&spread_sixth(), Integrator::ImplicitEuler);
+}
+
+#[test]
+fn no_corner_of_a_spread_sixth_makes_energy_in_the_second_order() {
+    make_no_energy_and_stay_above_the_floor(&spread_sixth(), Integrator::Bdf2);
+}
+
+fn spread_sixth() -> Vec<Corner> {
     // Any two values of different kinds meet in one of these 36: of three-valued kinds the places add up to one
     // modulo three, of two-valued ones to an even number. The softest, longest and heaviest are among them.
     let is_kept = |[e, nu, dt, ratio, iterations, speed]: [usize; 6]| {
         (e + dt + ratio) % 3 == 1 && (nu + iterations + speed) % 2 == 0
     };
     let kept = grid().into_iter().filter(|(_, places)| is_kept(*places)).map(|(corner, _)| corner);
-    make_no_energy_and_stay_above_the_floor(&kept.chain(INSIDE).collect::<Vec<_>>());
+    kept.chain(INSIDE).collect()
 }
 
 #[test]
 #[ignore = "slow tier"]
 fn no_corner_makes_energy_or_goes_through_the_floor() {
-    let all = grid().into_iter().map(|(corner, _)| corner);
-    make_no_energy_and_stay_above_the_floor(&all.chain(INSIDE).collect::<Vec<_>>());
+    let all = grid().into_iter().map(|(corner, _)| corner).chain(INSIDE).collect::<Vec<_>>();
+    for integrator in [Integrator::ImplicitEuler, Integrator::Bdf2] {
+        make_no_energy_and_stay_above_the_floor(&all, integrator);
+    }
 }

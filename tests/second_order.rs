@@ -104,10 +104,11 @@ fn bent_bars_never_gain_energy() {
 }
 
 #[test]
-fn thrown_cube_lands_and_rests_as_with_implicit_euler() {
+fn thrown_cube_lands_and_rests() {
     let (mut physics, floor) = world_with_floor(1.0 / 60.0);
     let mut world = DeformableWorld::new();
-    let material = DeformableMaterial::new(1e5, 0.3);
+    // What the second order keeps, the material damps.
+    let material = DeformableMaterial::new(1e5, 0.3).stiffness_damping(0.01);
     let cube = cube(material, 1.0).rotation(Vector::new(0.6, 0.2, 0.4)).linvel(Vector::new(1.0, -2.0, 0.0));
     let cube = world.insert(cube.settings(settings(Integrator::Bdf2))).unwrap();
     let mut before = f64::INFINITY;

@@ -43,4 +43,4 @@ pub use set::DeformableBodySet;
 pub use settings::{Acceleration, FactorPrecision, Fidelity, Frames, Integrator, Solver, SolverSettings};
 pub(crate) use sleep::TIME_UNTIL_SLEEP;
 pub use state::DeformableState;
-pub(crate) use state::{Surroundings, is_number};
+pub(crate) use state::{History, Surroundings, is_number};

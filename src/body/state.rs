@@ -35,12 +35,35 @@ pub(crate) struct History {
     pub h: f64,
     pub x: Vec<Vec3>,
     pub v: Vec<Vec3>,
+    /// Accelerations [m/s²] of a step of generalized-α, and what contacts hold nodes against \[N\].
+    pub acceleration: Vec<Vec3>,
+    pub steady: Vec<Vec3>,
+    /// Steps in contact to come that are of implicit Euler, and how often in a row it had to step in.
+    pub wait: u8,
+    pub failures: u8,
 }
 
+/// Most failures in a row that double the steps until the next try.
+const MAX_FAILURES: u8 = 4;
+
 impl History {
+    /// Notes how a step in contact went: by generalized-α, or because that had failed, or in wait of the next try.
+    pub fn count(&mut self, went: bool, failed: bool) {
+        if failed {
+            self.failures = (self.failures + 1).min(MAX_FAILURES);
+            self.wait = (1 << self.failures) - 1;
+        } else if went {
+            self.failures = 0;
+        } else {
+            self.wait = self.wait.saturating_sub(1);
+        }
+    }
+
     pub fn clear(&mut self) {
         self.x.clear();
         self.v.clear();
+        self.acceleration.clear();
+        self.steady.clear();
     }
 }
 

@@ -6,7 +6,7 @@ use super::step::StepScratch;
 use crate::body::{DeformableBodySet, Integrator};
 use crate::coupling::PhysicsParts;
 use crate::error::DeformableBodyError;
-use crate::solver::{FactorKey, SECOND_ORDER};
+use crate::solver::{FactorKey, SECOND_ORDER, alpha_step};
 use std::fmt;
 
 /// Steps deformable bodies beside rapier: for games with their own loop and sets. Holds memory and
@@ -93,6 +93,7 @@ impl DeformablePipeline {
             if body.settings().integrator == Integrator::Bdf2 {
                 let key = FactorKey::new(body, SECOND_ORDER * near);
                 self.scratch.factors.prepare(&key, body, 1, std::iter::empty());
+                self.scratch.factors.prepare_surface(&FactorKey::new(body, alpha_step(near)), body);
             }
         }
         Ok(())

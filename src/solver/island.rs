@@ -84,6 +84,7 @@ impl Island {
         if self.contacts.is_empty() {
             self.end_in_flight(context);
         } else {
+            self.redo_steps_that_gain_energy(context);
             self.reject_steps_that_gain_energy(context);
         }
         self.bodies.iter().for_each(|b| self.report.counters.add(&b.preconditioner.counters));
@@ -94,6 +95,9 @@ impl Island {
         for _ in 0..iterations {
             self.report.iterations += 1;
             let outcome = self.iterate(context);
+            if !self.contacts.is_empty() {
+                self.bodies.iter_mut().for_each(BodyProblem::update_steady);
+            }
             let done = match outcome {
                 Outcome::Stalled => true,
                 Outcome::Turned => false,
@@ -111,6 +115,30 @@ impl Island {
                     self.contacts.outdate(Change::Frames);
                 }
             }
+        }
+    }
+
+    /// Does steps in contact of the second order that have gained energy again by implicit Euler.
+    fn redo_steps_that_gain_energy(&mut self, context: &SolveContext<'_>) {
+        loop {
+            let in_flight = self.contacts.active.is_empty();
+            let mut again = false;
+            for index in 0..self.bodies.len() {
+                let gained = self.bodies[index].is_alpha()
+                    && (self.would_be_rejected(index, context) || self.bodies[index].gained_much(in_flight));
+                if gained {
+                    let body = &mut self.bodies[index];
+                    body.restart_first_order();
+                    body.choose_initial_guess(context.factors.get(body.factor));
+                    self.accelerations[index].clear();
+                    again = true;
+                }
+            }
+            if !again {
+                break;
+            }
+            self.contacts.begin_again();
+            self.iterate_until_done(context);
         }
     }
 
@@ -148,10 +176,7 @@ impl Island {
         loop {
             let mut gains = false;
             for index in 0..self.bodies.len() {
-                let body = &self.bodies[index];
-                let is_solved = self.contacts.work.error <= FAR_FROM_SOLVED
-                    && body.residual() <= FAR_FROM_SOLVED * body.force_scale();
-                if !is_solved && self.would_gain_energy(index, 0.0, context) {
+                if self.would_be_rejected(index, context) {
                     self.bodies[index].is_rejected = true;
                     gains = true;
                 }
@@ -161,6 +186,13 @@ impl Island {
             }
             self.step_rigid_fallbacks(context);
         }
+    }
+
+    fn would_be_rejected(&mut self, index: usize, context: &SolveContext<'_>) -> bool {
+        let body = &self.bodies[index];
+        let is_solved = self.contacts.work.error <= FAR_FROM_SOLVED
+            && body.residual() <= FAR_FROM_SOLVED * body.force_scale();
+        !is_solved && self.would_gain_energy(index, 0.0, context)
     }
 
     /// Whether a body's step makes energy, with what its contacts make and `besides` \[J\]; not if it was rejected.
@@ -235,7 +267,7 @@ impl Island {
                 // of the scale the body stays where it is: its step would have been a thousandth.
                 if !acceleration.is_empty() {
                     acceleration.clear();
-                } else if body.step_damping < MAX_STEP_DAMPING {
+                } else if body.step_damping < MAX_STEP_DAMPING * body.scale {
                     body.step_damping *= 2.0;
                     damped_more = true;
                 } else {

@@ -28,7 +28,7 @@ mod sweep_tests;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use body_step::{BodyProblem, ROUNDING, SECOND_ORDER};
+pub(crate) use body_step::{BodyProblem, ROUNDING, SECOND_ORDER, alpha_step};
 pub(crate) use constraints::{
     Articulation, ContactLimits, ContactResult, Reaction, RigidProxies, RigidProxy, SolveContext, Twist,
 };

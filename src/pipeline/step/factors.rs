@@ -16,7 +16,7 @@ impl StepScratch {
     ) {
         for work in self.works.iter_mut().filter(|work| work.is_touched()) {
             if let Some(problem) = &mut work.problem {
-                problem.begin_first_order(&deformables[work.handle], &context.gravity);
+                problem.begin_in_contact(&deformables[work.handle], &context.gravity);
             }
         }
     }

@@ -80,18 +80,26 @@ pub(super) fn store(
 ) {
     let problem = &work.island.bodies[local];
     body.state.history.clear();
-    if problem.settings.integrator == Integrator::Bdf2 && work.island.contacts.is_empty() {
+    if problem.settings.integrator == Integrator::Bdf2 {
         let DeformableState { x, v, history, .. } = &mut body.state;
-        history.h = h;
-        history.x.clone_from(x);
-        history.v.clone_from(v);
+        if work.island.contacts.is_empty() && !(problem.is_alpha() || problem.was_redone) {
+            history.h = h;
+            history.x.clone_from(x);
+            history.v.clone_from(v);
+        } else {
+            problem.note_contact(history);
+        }
     }
     body.state.factor_base.note(h, &problem.key.base);
     let in_flight = work.island.contacts.active.is_empty();
     let is_limited = problem.final_velocities(in_flight, &mut body.state.v);
-    if is_limited || problem.is_rejected {
-        // What a step of the second order has left unsolved grows by its extrapolation: the next one is of the first.
+    if problem.is_rejected {
         body.state.history.clear();
+    }
+    if is_limited {
+        // What a step of the second order has left unsolved grows by its extrapolation: the next one is of the first.
+        body.state.history.x.clear();
+        body.state.history.v.clear();
     }
     body.state.x.clone_from(&problem.current.x);
     let share = problem.pin_share();

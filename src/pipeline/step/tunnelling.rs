@@ -61,7 +61,7 @@ impl TunnellingStops {
             return 0.0;
         }
         let lost = |(node, stop): &(usize, Stop)| {
-            let v = (problem.current.x[*node] - problem.x_start[*node]) / problem.h();
+            let v = problem.mean_velocity(*node);
             0.5 * problem.mass(*node) * (v.norm_squared() - stop.slowed(&v, h).norm_squared())
         };
         let lost = self.stops.iter().map(lost).sum();

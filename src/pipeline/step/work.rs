@@ -144,8 +144,8 @@ impl BodyWork {
         }
         let DeformableState { x, v, contacts, shared, impacts, history, .. } = &mut body.state;
         history.clear();
-        for (i, (new, old)) in problem.current.x.iter().zip(&problem.x_start).enumerate() {
-            (x[i], v[i]) = (*new, (new - old) / problem.h());
+        for (i, new) in problem.current.x.iter().enumerate() {
+            (x[i], v[i]) = (*new, problem.mean_velocity(i));
         }
         contacts.clear();
         shared.clear();

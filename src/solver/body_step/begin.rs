@@ -1,6 +1,7 @@
 //! A body taken into a step: inertial targets, masses, pins, and the key of the matrix that serves.
 
-use super::problem::{BodyProblem, Iterate, SECOND_ORDER};
+use super::generalized_alpha::{SCALE, alpha_step};
+use super::problem::{BodyProblem, Iterate, SECOND_ORDER, Scheme};
 use crate::body::{DeformableBody, Integrator, PrescribedNode};
 use crate::fem::elastic_forces::StiffnessDamping;
 use crate::math::{Mat3, Vec3};
@@ -21,7 +22,11 @@ impl BodyProblem {
             activation: body.activation,
             h,
             dt: h,
-            is_second_order: false,
+            reach: h,
+            scale: 1.0,
+            scheme: Scheme::ImplicitEuler,
+            fall: Vec::new(),
+            alpha: Default::default(),
             x_start: Vec::new(),
             v_start: Vec::new(),
             before: Default::default(),
@@ -39,6 +44,7 @@ impl BodyProblem {
             step_damping: 1.0,
             guard_retries: 0,
             is_rejected: false,
+            was_redone: false,
             weight: 0.0,
             step: vec![Vec3::zeros(); n],
             force: Vec::new(),
@@ -61,39 +67,64 @@ impl BodyProblem {
         self.prescribed.dedup_by_key(|p| p.node);
         let history = &body.state.history;
         let continues = history.h == h && history.x.len() == body.state.x.len();
-        self.is_second_order = continues && body.settings().integrator == Integrator::Bdf2;
+        let is_second_order = body.settings().integrator == Integrator::Bdf2;
+        self.scheme = match continues {
+            true if is_second_order => Scheme::Bdf2,
+            _ => Scheme::ImplicitEuler,
+        };
         self.dt = h;
         self.read_body(body, gravity);
     }
 
-    /// Begins again by implicit Euler, if it had not been so: the body is touched.
-    pub fn begin_first_order(&mut self, body: &DeformableBody, gravity: &Vec3) {
-        if self.is_second_order {
-            self.is_second_order = false;
-            self.read_body(body, gravity);
+    /// Begins again where anything may touch the body: by generalized-α, if it is of the second order.
+    pub fn begin_in_contact(&mut self, body: &DeformableBody, gravity: &Vec3) {
+        if self.settings.integrator == Integrator::Bdf2 {
+            let goes = self.goes_by_alpha(body, gravity);
+            let scheme = if goes { Scheme::GeneralizedAlpha } else { Scheme::ImplicitEuler };
+            if scheme != std::mem::replace(&mut self.scheme, scheme) {
+                self.read_body(body, gravity);
+            }
         }
     }
 
     fn read_body(&mut self, body: &DeformableBody, gravity: &Vec3) {
-        let n = body.state.x.len();
-        let part = if self.is_second_order { SECOND_ORDER } else { 1.0 };
-        let h = part * self.dt;
-        let near = part * body.state.factor_base.step_near(self.dt);
+        let step = |dt: f64| match self.scheme {
+            Scheme::ImplicitEuler => dt,
+            Scheme::Bdf2 => SECOND_ORDER * dt,
+            Scheme::GeneralizedAlpha => alpha_step(dt),
+        };
+        let near = step(body.state.factor_base.step_near(self.dt));
+        self.h = step(self.dt);
+        (self.reach, self.scale) = if self.is_alpha() { (self.dt, SCALE) } else { (self.h, 1.0) };
         self.key.update(body, near, self.prescribed.iter().map(|p| p.node));
         self.settings = *body.settings();
         self.material = body.material;
         self.activation = body.activation;
-        self.h = h;
-        self.step_damping = 1.0;
+        self.step_damping = self.scale;
         self.guard_retries = 0;
         self.is_rejected = false;
+        self.was_redone = false;
         self.kinetic_bound = f64::INFINITY;
         self.preconditioner.counters = SolveCounters::default();
+        self.read_state(body);
+        self.set_targets(body, gravity);
+        let n = self.x_start.len();
+        self.contact_force.clear();
+        self.contact_force.resize(n, Vec3::zeros());
+        self.step.resize(n, Vec3::zeros());
+        let before = (self.scheme == Scheme::Bdf2).then_some(&body.state.history.x[..]);
+        let (beta, h) = (self.material.stiffness_damping, self.damping_step());
+        self.damping.begin(&self.model, beta, h, &body.state.x, before);
+        let mass = self.masses.iter().sum::<f64>();
+        self.weight = mass * (gravity * body.gravity_scale()).norm() / n as f64;
+    }
+
+    fn read_state(&mut self, body: &DeformableBody) {
         self.x_start.clone_from(&body.state.x);
         self.v_start.clone_from(&body.state.v);
         self.impacts.clone_from(&body.state.impacts);
         self.spin = Vec3::from(body.angular_momentum());
-        if self.is_second_order {
+        if self.scheme == Scheme::Bdf2 {
             self.before.0.clone_from(&body.state.x);
             self.before.1.clone_from(&body.state.v);
             let history = &body.state.history;
@@ -103,26 +134,27 @@ impl BodyProblem {
             });
         }
         self.masses.clear();
-        self.masses.extend((0..n).map(|i| body.node_mass(i)));
+        self.masses.extend((0..self.x_start.len()).map(|i| body.node_mass(i)));
+    }
+
+    /// Sets where the nodes would go without internal and contact forces; pinned ones go where they are led.
+    fn set_targets(&mut self, body: &DeformableBody, gravity: &Vec3) {
         let g = gravity * body.gravity_scale();
+        let fall = |i: usize| g + body.forces.get(i).map_or(Vec3::zeros(), |f| f / self.masses[i]);
+        self.fall.clear();
+        self.fall.extend((0..self.masses.len()).map(fall));
+        let h = self.h;
+        let to_target = |i: usize| self.x_start[i] + self.v_start[i] * h + self.fall[i] * (h * h);
         self.target.clear();
-        let to_target = |i: usize| {
-            let acceleration = g + body.forces.get(i).map_or(Vec3::zeros(), |f| f / self.masses[i]);
-            self.x_start[i] + self.v_start[i] * h + acceleration * (h * h)
-        };
-        self.target.extend((0..n).map(to_target));
+        self.target.extend((0..self.masses.len()).map(to_target));
+        if self.is_alpha() {
+            self.begin_alpha(&body.state.history);
+        }
         self.pinned_inertia.clear();
         self.pinned_inertia.extend(self.key.pins.iter().map(|&p| self.target[p as usize]));
         let pins = body.pins.iter().map(|pin| (pin.node, pin.target));
         for (node, target) in pins.chain(self.prescribed.iter().map(|p| (p.node, p.target))) {
             self.target[node as usize] = target;
         }
-        self.contact_force.clear();
-        self.contact_force.resize(n, Vec3::zeros());
-        self.step.resize(n, Vec3::zeros());
-        let before = self.is_second_order.then_some(&body.state.history.x[..]);
-        self.damping.begin(&self.model, self.material.stiffness_damping, h, &body.state.x, before);
-        let mass = self.masses.iter().sum::<f64>();
-        self.weight = mass * g.norm() / n as f64;
     }
 }

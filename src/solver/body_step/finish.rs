@@ -1,6 +1,6 @@
 //! What is put right at the end of a body's step, and read off it.
 
-use super::problem::BodyProblem;
+use super::problem::{BodyProblem, Scheme};
 use crate::math::{Vec3, centre_of_mass, inertia_about, rotation_from_vector, solve_semidefinite};
 
 /// Largest turn \[rad\] that [`BodyProblem::balance`] takes for the rest of an iteration.
@@ -26,9 +26,9 @@ impl BodyProblem {
             moment += (x - centre).cross(r);
         }
         let inertia = inertia_about(&centre, x, &self.masses);
-        let turn = solve_semidefinite(&inertia, &moment) * mobility;
+        let turn = solve_semidefinite(&inertia, &moment) * (mobility / self.scale);
         let turn = if turn.norm() < MAX_BALANCING_TURN { turn } else { Vec3::zeros() };
-        let (rotation, shift) = (rotation_from_vector(&turn), force * (mobility / total));
+        let (rotation, shift) = (rotation_from_vector(&turn), force * (mobility / (self.scale * total)));
         x.iter_mut().for_each(|x| *x = centre + shift + rotation * (*x - centre));
     }
 
@@ -41,13 +41,27 @@ impl BodyProblem {
 
     pub(super) fn unlimited_velocities(&self, in_flight: bool, v: &mut Vec<Vec3>) {
         v.clear();
-        v.extend(self.current.x.iter().zip(&self.x_start).map(|(new, old)| (new - old) / self.h));
-        if !self.settings.keeps_spin || !self.key.pins.is_empty() {
+        v.extend((0..self.masses.len()).map(|i| self.mean_velocity(i)));
+        if self.is_alpha() {
+            let mut pins = self.key.pins.iter().peekable();
+            for (i, v) in v.iter_mut().enumerate() {
+                if pins.next_if(|&&p| p as usize == i).is_none() {
+                    *v = self.alpha_end(i).0;
+                }
+            }
+        }
+        if !self.key.pins.is_empty() {
+            return;
+        }
+        if self.is_alpha() {
+            return self.balance_momenta(v);
+        }
+        if !self.settings.keeps_spin {
             return;
         }
         if in_flight {
             self.balance_spin(v);
-        } else if !self.is_second_order {
+        } else if self.scheme == Scheme::ImplicitEuler {
             self.give_back_spin(v);
         }
     }
@@ -56,12 +70,11 @@ impl BodyProblem {
     /// back, with what the iteration has left.
     fn balance_spin(&self, v: &mut [Vec3]) {
         let (_, centre) = centre_of_mass(&self.current.x, &self.masses);
-        let inertial = |i: usize| self.target[i] - self.x_start[i] - self.v_start[i] * self.h;
         let (mut gained, mut lost) = (Vec3::zeros(), Vec3::zeros());
         for (i, m) in self.masses.iter().enumerate() {
             let arm = self.current.x[i] - centre;
             // External forces act where the nodes are at the end of the step, as in the step itself.
-            gained += arm.cross(&inertial(i)) * (*m / (self.h * self.h) * self.dt);
+            gained += arm.cross(&self.fall[i]) * (*m * self.dt);
             lost += arm.cross(&v[i]) * *m;
         }
         let drag = 1.0 + self.material.mass_damping * self.dt;
@@ -130,6 +143,9 @@ impl BodyProblem {
     pub fn pin_force(&self, node: u32, share: &Vec3) -> Vec3 {
         let Ok(k) = self.key.pins.binary_search(&node) else { return Vec3::zeros() };
         let node = node as usize;
+        if self.is_alpha() {
+            return self.alpha_pin_force(node) - share;
+        }
         let inertia =
             (self.pinned_inertia[k] - self.current.x[node]) * (self.masses[node] / (self.h * self.h));
         -(inertia + self.current.r[node] + self.contact_force[node]) - share

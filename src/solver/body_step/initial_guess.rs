@@ -21,16 +21,18 @@ impl BodyProblem {
     /// shape or the inertial target, whichever has the lower Ψ; of a pinned body where it is, if that has much less.
     pub fn choose_initial_guess(&mut self, factor: &SystemFactor) {
         let is_pinned = !self.key.pins.is_empty();
-        if is_pinned {
+        let drifts = is_pinned || self.is_alpha();
+        if drifts {
             // What is pinned does not fall: by its motion alone, so that what hangs still starts where it is.
-            let drift = self.x_start.iter().zip(&self.v_start).map(|(x, v)| x + v * self.h);
+            let falls = if is_pinned { 0.0 } else { self.reach };
+            let drift = |i: usize| self.x_start[i] + (self.v_start[i] + self.fall[i] * falls) * self.reach;
             self.force.clear();
-            self.force.extend(drift);
+            self.force.extend((0..self.masses.len()).map(drift));
             self.key.pins.iter().for_each(|&p| self.force[p as usize] = self.target[p as usize]);
         }
-        let goes_to = std::mem::take(if is_pinned { &mut self.force } else { &mut self.target });
+        let goes_to = std::mem::take(if drifts { &mut self.force } else { &mut self.target });
         let turned = self.carry_start_to(&goes_to);
-        *if is_pinned { &mut self.force } else { &mut self.target } = goes_to;
+        *if drifts { &mut self.force } else { &mut self.target } = goes_to;
         if is_pinned {
             // Shift so that the pinned nodes fit on average, then put them where they belong.
             let miss = |&p: &u32| self.target[p as usize] - self.current.x[p as usize];
@@ -42,7 +44,7 @@ impl BodyProblem {
         }
         self.frame = turned;
         self.evaluate_current();
-        self.trial.x.clone_from(&self.target);
+        self.trial.x.clone_from(if self.is_alpha() { &self.force } else { &self.target });
         self.accept_below(self.current.objective);
         if is_pinned {
             let limit = STAY * self.current.objective;

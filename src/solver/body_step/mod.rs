@@ -5,10 +5,12 @@ mod problem;
 mod begin;
 mod energy_bound;
 mod finish;
+mod generalized_alpha;
 mod initial_guess;
 mod newton_factors;
 mod rigid_fallback;
 
+pub(crate) use generalized_alpha::alpha_step;
 pub(crate) use newton_factors::{Factors, NewtonFactors};
 pub(in crate::solver) use problem::are_large;
 pub(crate) use problem::{BodyProblem, ROUNDING, SECOND_ORDER};

@@ -65,7 +65,7 @@ impl NewtonFactors {
                 continue;
             }
             some = true;
-            body.step_damping = 1.0;
+            body.step_damping = body.scale;
             let symbolic = &cache.get(body.factor).symbolic;
             self.made[index] = self.tangent(index, body, symbolic, constraints.clone());
         }

@@ -4,6 +4,7 @@
 //! `s = x_n + h v_n + h² M⁻¹ f_ext` [Bouaziz et al. 2014], E the elastic energy with the stiffness
 //! damping of the step. The residual is `r = −∂Ψ/∂x` \[N\]; pinned nodes are not unknowns.
 
+use super::generalized_alpha::{ALPHA_F, AlphaStart};
 use crate::body::{Impact, PrescribedNode, SolverSettings};
 use crate::fem::elastic_forces::{Evaluation, StiffnessDamping};
 use crate::fem::{DeformableModel, Elements, elastic_forces};
@@ -29,6 +30,14 @@ pub(in crate::solver) fn are_large(bodies: &[BodyProblem]) -> bool {
     bodies.iter().map(|body| body.model.tetrahedron_count()).sum::<usize>() > LARGE
 }
 
+/// How a step goes forward in time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scheme {
+    ImplicitEuler,
+    Bdf2,
+    GeneralizedAlpha,
+}
+
 /// Step of the matrix over that of time, of the second order.
 pub(crate) const SECOND_ORDER: f64 = 2.0 / 3.0;
 
@@ -46,8 +55,14 @@ pub(crate) struct BodyProblem {
     /// The step that the objective is of \[s\], and that by which time goes on.
     pub(super) h: f64,
     pub(super) dt: f64,
-    /// Goes forward by two steps.
-    pub(super) is_second_order: bool,
+    /// Time \[s\] between `x_start` and the end of the step.
+    pub(super) reach: f64,
+    /// Factor on Ψ, and so c at first: where it is h²/dt², contact forces are those of the time step.
+    pub scale: f64,
+    pub(super) scheme: Scheme,
+    /// Acceleration by external forces [m/s²].
+    pub(super) fall: Vec<Vec3>,
+    pub(super) alpha: AlphaStart,
     /// Positions and velocities at the start of the step; of the second order what they amount to.
     pub x_start: Vec<Vec3>,
     pub v_start: Vec<Vec3>,
@@ -75,6 +90,8 @@ pub(crate) struct BodyProblem {
     pub guard_retries: usize,
     /// The step would have made energy: the body falls back to a rigid motion.
     pub is_rejected: bool,
+    /// Generalized-α would have made energy: implicit Euler took its place.
+    pub was_redone: bool,
     /// A force that counts as large for this body \[N\].
     pub weight: f64,
     pub(super) step: Vec<Vec3>,
@@ -131,6 +148,16 @@ impl BodyProblem {
     /// The step \[s\] that the objective is of.
     pub fn h(&self) -> f64 {
         self.h
+    }
+
+    /// The step \[s\] over which damping acts in the objective.
+    pub(super) fn damping_step(&self) -> f64 {
+        if self.is_alpha() { self.dt * (1.0 - ALPHA_F) } else { self.h }
+    }
+
+    /// Mean velocity of a node in the step [m/s].
+    pub fn mean_velocity(&self, node: usize) -> Vec3 {
+        (self.current.x[node] - self.x_start[node]) / self.reach
     }
 
     /// The step \[s\] by which time goes on.
@@ -239,7 +266,8 @@ impl BodyProblem {
         at.r.resize(at.x.len(), Vec3::zeros());
         let (model, material, activation) = (&*self.model, &self.material, self.activation);
         let elements = Elements { model, material, activation };
-        let place = Evaluation { damping: &self.damping, x: &at.x, frame: &self.frame, limit };
+        let place =
+            Evaluation { damping: &self.damping, x: &at.x, frame: &self.frame, limit: limit / self.scale };
         let time = &mut self.preconditioner.counters.element_time;
         let elastic = timed(time, || elastic_forces::add_forces(&elements, &place, &mut at.r));
         self.preconditioner.counters.elements += elastic.evaluated;
@@ -249,6 +277,9 @@ impl BodyProblem {
         }
         at.elastic = elastic.energy;
         at.least_trace = elastic.least_trace;
+        if self.scale != 1.0 {
+            at.r.iter_mut().for_each(|r| *r *= self.scale);
+        }
         at.internal = at.r.iter().map(|f| f.amax()).fold(0.0, f64::max);
         let (inertia, drag) = self.inertia_and_drag();
         let mut kinetic = 0.0;
@@ -258,12 +289,12 @@ impl BodyProblem {
             at.r[i] += (from_target * inertia - moved * drag) * m;
             kinetic += m * (inertia * from_target.norm_squared() + drag * moved.norm_squared());
         }
-        at.objective = elastic.energy + 0.5 * kinetic;
+        at.objective = elastic.energy * self.scale + 0.5 * kinetic;
     }
 
     /// Factors of the masses in Ψ [1/s²], before distances to the target and from the start.
-    fn inertia_and_drag(&self) -> (f64, f64) {
-        (1.0 / (self.h * self.h), self.material.mass_damping / self.h)
+    pub(super) fn inertia_and_drag(&self) -> (f64, f64) {
+        (self.scale / (self.h * self.h), self.scale * self.material.mass_damping / self.damping_step())
     }
 
     /// What Ψ \[J\] is at least at `x`: what is not elastic.

@@ -25,6 +25,8 @@ impl BodyProblem {
         self.evaluate(&mut still, f64::INFINITY);
         let before = still.elastic;
         self.trial = still;
+        let mut ends = std::mem::take(&mut self.force);
+        self.unlimited_velocities(false, &mut ends);
         let (mut kinetic, mut gained, mut by_contact) = (0.0, self.current.elastic - before, 0.0);
         let mut pins = self.key.pins.iter().peekable();
         for (i, m) in self.masses.iter().enumerate() {
@@ -35,13 +37,14 @@ impl BodyProblem {
                 continue;
             }
             let v = self.v_start[i];
-            let external = ((self.target[i] - self.x_start[i]) / self.h - v) * (*m / self.h);
+            let external = self.fall[i] * *m;
             let contact = self.contact_force[i].dot(&moved);
             kinetic += 0.5 * m * v.norm_squared();
-            gained += 0.5 * m * (moved.norm_squared() / (self.h * self.h) - v.norm_squared());
+            gained += 0.5 * m * (ends[i].norm_squared() - v.norm_squared());
             gained -= external.dot(&moved) + contact;
             by_contact += contact;
         }
+        self.force = ends;
         let iterations = self.settings.max_iterations.max(1) as f64;
         let share = MAX_GAIN / iterations;
         let allowed = share * (before + kinetic) + MAX_GAIN_OF_WORK * by_contact.abs();
@@ -64,6 +67,7 @@ impl BodyProblem {
     /// Rejects the step: sets the trial to where the body goes in its shape under the present contact forces. A free one
     /// first turns as it would without them: about where it was at the start, contacts would miss by the square of its turn.
     pub fn begin_rigid_fallback(&mut self, factor: &SystemFactor) {
+        self.restart_first_order();
         let mut forces = std::mem::take(&mut self.force);
         forces.clone_from(&self.contact_force);
         if self.key.pins.is_empty() {

@@ -39,6 +39,14 @@ impl ContactSystem {
         self.scatter_contact_forces(bodies);
     }
 
+    /// Begins anew in the same step with the forces that there are.
+    pub fn begin_again(&mut self) {
+        self.work = ContactWork::default();
+        self.renew_budget();
+        self.free.method.begin();
+        self.outdate(Change::Contacts);
+    }
+
     /// Activates constraints that end less than `slack` from touching at the bodies' trial positions under the present
     /// forces; true if there were such.
     pub fn activate(&mut self, bodies: &[BodyProblem], context: &SolveContext<'_>, slack: Slack) -> bool {

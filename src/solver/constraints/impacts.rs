@@ -178,7 +178,7 @@ impl Meeting {
                     if let Some(motion) = &motion {
                         own = motion.at(&point);
                         meeting.mobility += motion.mobility(&point, &normal);
-                        gained = problem.free_fall(motion);
+                        gained = problem.free_fall();
                     }
                     meeting.soft[k] = Some((*body, motion));
                 }
