@@ -48,9 +48,11 @@ pub enum Integrator {
     #[default]
     ImplicitEuler,
     /// The backward differentiation formula of second order, `x = (4xₙ − xₙ₋₁)/3 + 2h/3·v` [Hairer & Wanner
-    /// 1996], with a constant matrix of its own. Keeps vibrations that implicit Euler damps out. A body that
-    /// touches something, is attached to something, or was moved, pinned or let go by its user takes steps of
-    /// implicit Euler until it has been free for one. Pins may stay, and be led.
+    /// 1996], and generalized-α with impulses while something touches the body or it is attached [Chung & Hulbert 1993; Chen et al.
+    /// 2013], with a constant matrix each. Keeps vibrations that implicit Euler damps out, and bounces that last four steps
+    /// and more: without damping of the material a body may swing for long. No step makes energy: one that would is done again
+    /// by implicit Euler, which also takes steps in contact of more than 0.04 s and brings to rest what hardly moves. Memory for two
+    /// more factors; steps in contact take about a tenth more time, those of an impact up to twice as much.
     Bdf2,
 }
 

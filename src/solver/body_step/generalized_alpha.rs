@@ -1,5 +1,5 @@
 //! The second order where contacts act: generalized-α [Chung & Hulbert 1993] for what changes smoothly, implicit Euler
-//! for impulses [Brüls et al. 2014].
+//! for impulses [Chen et al. 2013].
 //!
 //! Elastic and external forces f, and what contacts hold against them, s, go by
 //!
@@ -21,10 +21,10 @@ use crate::body::{DeformableBody, History};
 use crate::fem::elastic_forces::{self, Evaluation, StiffnessDamping};
 use crate::math::{Mat3, Vec3, centre_of_mass, inertia_about, solve_semidefinite};
 
-/// What a step leaves of the stiffest motion: ρ∞.
-const KEPT: f64 = 0.8;
-const ALPHA_M: f64 = (2.0 * KEPT - 1.0) / (KEPT + 1.0);
-pub(super) const ALPHA_F: f64 = KEPT / (KEPT + 1.0);
+/// What a step leaves of the stiffest motion, ρ∞ [Chung & Hulbert 1993].
+const RHO_INFINITY: f64 = 0.8;
+const ALPHA_M: f64 = (2.0 * RHO_INFINITY - 1.0) / (RHO_INFINITY + 1.0);
+pub(super) const ALPHA_F: f64 = RHO_INFINITY / (RHO_INFINITY + 1.0);
 const GAMMA: f64 = 0.5 - ALPHA_M + ALPHA_F;
 const BETA: f64 = 0.25 * (1.0 - ALPHA_M + ALPHA_F) * (1.0 - ALPHA_M + ALPHA_F);
 /// 1/κ.
