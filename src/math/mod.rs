@@ -37,8 +37,13 @@ pub(crate) fn to_real(v: &Vec3) -> Vector {
 /// `S⁻¹ b` for a symmetric positive semi-definite S, without the axes about which it has next to nothing: those of an
 /// inertia of points in a line.
 pub(crate) fn solve_semidefinite(S: &Mat3, b: &Vec3) -> Vec3 {
+    solve_without_small(S, b, 1.0e-9)
+}
+
+/// As [`solve_semidefinite`], without the axes about which S has less than a share of its most.
+pub(crate) fn solve_without_small(S: &Mat3, b: &Vec3, share: f64) -> Vec3 {
     let eigen = S.symmetric_eigen();
-    let least = 1.0e-9 * eigen.eigenvalues.max();
+    let least = share * eigen.eigenvalues.max();
     let mut out = Vec3::zeros();
     for k in 0..3 {
         let axis: Vec3 = eigen.eigenvectors.column(k).into();

@@ -63,6 +63,8 @@ const BEFORE_SOLVE: Slack = Slack { edges: 0.01, motions: 0.05 };
 const AFTER_SOLVE: Slack = Slack { edges: -1.0e-5, motions: 0.05 };
 /// Residual over forces, and error of contact forces, beyond which a step goes on and is looked at again.
 const FAR_FROM_SOLVED: f64 = 0.1;
+/// Contact problems of rejected steps, at the most, until contacts turn them no more.
+const FALLBACK_ROUNDS: usize = 4;
 /// Largest factor on A that the guard tries.
 const MAX_STEP_DAMPING: f64 = 1024.0;
 
@@ -204,35 +206,42 @@ impl Island {
         self.bodies[index].gains_energy(by_contacts.max(0.0) + besides)
     }
 
-    /// Moves bodies whose step was rejected as rigid ones, with contacts solved anew.
+    /// Moves bodies whose step was rejected as rigid ones, with contacts solved anew; again about where those have turned one.
     pub fn step_rigid_fallbacks(&mut self, context: &SolveContext<'_>) {
         for index in 0..self.bodies.len() {
             if self.bodies[index].is_rejected {
                 self.contacts.restart(index);
+                self.bodies[index].reject_step();
             }
         }
-        self.contacts.scatter_changes(&mut self.bodies);
-        // What is left of the step's would leave between rigid shapes what makes energy.
-        self.contacts.renew_budget();
-        let own = Factors { cache: context.factors, newton: &self.newton_factors };
-        for (index, body) in self.bodies.iter_mut().enumerate() {
-            let factor = own.of(index, body);
-            if body.is_rejected {
-                body.begin_rigid_fallback(factor);
-            } else {
-                body.trial.x.clone_from(&body.current.x);
-                body.contact_step(factor);
+        for _ in 0..FALLBACK_ROUNDS {
+            self.contacts.scatter_changes(&mut self.bodies);
+            // What is left of the step's would leave between rigid shapes what makes energy.
+            self.contacts.renew_budget();
+            let own = Factors { cache: context.factors, newton: &self.newton_factors };
+            for (index, body) in self.bodies.iter_mut().enumerate() {
+                let factor = own.of(index, body);
+                if body.is_rejected {
+                    body.begin_rigid_fallback(factor);
+                } else {
+                    body.trial.x.clone_from(&body.current.x);
+                    body.contact_step(factor);
+                }
             }
-        }
-        self.contacts.outdate(Change::Contacts);
-        self.solve_contacts(context);
-        for body in &mut self.bodies {
-            if body.is_rejected {
-                body.finish_rigid_fallback();
-            } else {
-                body.bend_step_to_rotation();
-                body.evaluate_trial();
-                body.accept_trial();
+            self.contacts.outdate(Change::Contacts);
+            self.solve_contacts(context);
+            let mut turned = false;
+            for body in &mut self.bodies {
+                if body.is_rejected {
+                    turned |= body.finish_rigid_fallback();
+                } else {
+                    body.bend_step_to_rotation();
+                    body.evaluate_trial();
+                    body.accept_trial();
+                }
+            }
+            if !turned {
+                break;
             }
         }
     }
@@ -299,7 +308,7 @@ impl Island {
     /// Evaluates the trial positions; true if one of them was bent to a true rotation.
     fn evaluate_trials(&mut self, touches: bool) -> bool {
         for_each_pair(&mut self.bodies, &mut self.trials, self.is_large, |_, body, trial| {
-            trial.is_bent = touches && body.bend_step_to_rotation();
+            trial.is_bent = touches && body.bend_step_to_rotation() > 0.0;
             body.evaluate_trial();
             trial.descends = body.trial_descends();
         });

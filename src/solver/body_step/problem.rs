@@ -10,10 +10,10 @@ use crate::fem::elastic_forces::{Evaluation, StiffnessDamping};
 use crate::fem::{DeformableModel, Elements, elastic_forces};
 use crate::material::DeformableMaterial;
 use crate::math::{
-    Mat3, Vec3, centre_of_mass, inertia_about, rotation_from_vector, skew, solve_semidefinite,
+    Mat3, Vec3, centre_of_mass, inertia_about, rotation_from_vector, skew, solve_without_small,
 };
 use crate::profiler::timed;
-use crate::solver::linear::{FactorId, FactorKey, Preconditioner, SystemFactor};
+use crate::solver::linear::{FactorId, FactorKey, Preconditioner, SLENDER, SystemFactor};
 use std::sync::Arc;
 
 /// Rotation of an iteration \[rad\] beyond which it is bent to a true one: below, the stretch is 5e-9.
@@ -206,11 +206,11 @@ impl BodyProblem {
     /// Where the step turns the body, puts the finite rotation in the place of the linear one: about
     /// the centre of mass c the trial gains `(exp ω − I − ω×)(x − c)`, ω the mean rotation of the step.
     /// A linear rotation by θ stretches everything by θ²/2, which a stiff body takes for a blow. What
-    /// it takes back draws contacts apart rather than together. True if there was something to bend:
-    /// contacts then want another iteration.
-    pub fn bend_step_to_rotation(&mut self) -> bool {
+    /// it takes back draws contacts apart rather than together. Gives the rotation \[rad\] where it was bent, else zero: contacts
+    /// then want another iteration.
+    pub fn bend_step_to_rotation(&mut self) -> f64 {
         if self.preconditioner.is_per_node() || !self.key.pins.is_empty() {
-            return false;
+            return 0.0;
         }
         let (_, centre) = centre_of_mass(&self.current.x, &self.masses);
         let (_, moved_to) = centre_of_mass(&self.trial.x, &self.masses);
@@ -220,15 +220,15 @@ impl BodyProblem {
             moment += r.cross(&(y - moved_to - r)) * *m;
         }
         let inertia = inertia_about(&centre, &self.current.x, &self.masses);
-        let omega = solve_semidefinite(&inertia, &moment);
+        let omega = solve_without_small(&inertia, &moment, SLENDER);
         if !(omega.norm() > BENT) {
-            return false;
+            return 0.0;
         }
         let bend = rotation_from_vector(&omega) - Mat3::identity() - skew(&omega);
         for (y, x) in self.trial.x.iter_mut().zip(&self.current.x) {
             *y += bend * (x - centre);
         }
-        true
+        omega.norm()
     }
 
     /// Pinned nodes are rows of the identity in A, without neighbours: what the solve says of them

@@ -12,6 +12,10 @@ const MAX_GAIN: f64 = 0.04;
 /// As [`MAX_GAIN`], of the work that contacts do on the body.
 const MAX_GAIN_OF_WORK: f64 = 1.0e-3;
 
+/// Turn \[rad\] of a rejected step by contacts beyond which they are solved again about where it has led: a rod of 20 cm that
+/// turns by so much misses them by 5e-4 m.
+const FALLBACK_TURN: f64 = 0.1;
+
 /// Factor on A of pinned bodies that keep their shape: they yield next to nothing.
 const STIFFENING: f64 = 1024.0;
 
@@ -64,16 +68,26 @@ impl BodyProblem {
         gained
     }
 
-    /// Rejects the step: sets the trial to where the body goes in its shape under the present contact forces. A free one
-    /// first turns as it would without them: about where it was at the start, contacts would miss by the square of its turn.
-    pub fn begin_rigid_fallback(&mut self, factor: &SystemFactor) {
+    /// Rejects the step: puts a free body where it goes in its shape without contacts, a pinned one back to its start. About
+    /// where it was at the start, contacts would miss by the square of its turn.
+    pub fn reject_step(&mut self) {
         self.restart_first_order();
-        let mut forces = std::mem::take(&mut self.force);
-        forces.clone_from(&self.contact_force);
         if self.key.pins.is_empty() {
             let target = std::mem::take(&mut self.target);
             self.carry_start_to(&target);
             self.target = target;
+        } else {
+            self.current.x.clone_from(&self.x_start);
+            self.key.pins.iter().for_each(|&p| self.current.x[p as usize] = self.target[p as usize]);
+        }
+    }
+
+    /// Sets the trial of a rejected step to where the body goes from its current positions as a rigid one under inertia and the
+    /// present contact forces.
+    pub fn begin_rigid_fallback(&mut self, factor: &SystemFactor) {
+        let mut forces = std::mem::take(&mut self.force);
+        forces.clone_from(&self.contact_force);
+        if self.key.pins.is_empty() {
             self.preconditioner.set_rigid(&self.current.x, &self.masses, self.mobility());
             self.step_damping = 1.0;
             // Drag resists all of the way, also what is gone already.
@@ -83,8 +97,6 @@ impl BodyProblem {
                 *force += (target * to_target - x * gone) * self.masses[i];
             }
         } else {
-            self.current.x.clone_from(&self.x_start);
-            self.key.pins.iter().for_each(|&p| self.current.x[p as usize] = self.target[p as usize]);
             self.step_damping = STIFFENING;
         }
         self.step_by(factor, &forces);
@@ -92,11 +104,14 @@ impl BodyProblem {
     }
 
     /// Ends what [`BodyProblem::begin_rigid_fallback`] began, with the trial where contacts have led it: by a finite rotation.
-    pub fn finish_rigid_fallback(&mut self) {
+    /// True if that is so large that contacts miss by it.
+    pub fn finish_rigid_fallback(&mut self) -> bool {
+        let mut turn = 0.0;
         if self.key.pins.is_empty() {
-            self.bend_step_to_rotation();
+            turn = self.bend_step_to_rotation();
             self.accept_trial();
         }
         self.evaluate_current();
+        turn > FALLBACK_TURN
     }
 }

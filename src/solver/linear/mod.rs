@@ -32,7 +32,7 @@ pub(crate) use affine_modes::{CoarseInverse, MODES};
 pub(crate) use block_matrix::{BlockFactor, BlockMatrix};
 pub(crate) use compliance_columns::ComplianceColumns;
 pub(crate) use factor::{FactorScratch, Symbolic};
-pub(crate) use rigid_mode::rigid_mobility;
+pub(crate) use rigid_mode::{SLENDER, rigid_mobility};
 
 pub(crate) use factor_cache::{FactorCache, FactorId, SystemFactor, columns_pay};
 pub(crate) use preconditioner::{BlockForm, Preconditioner};

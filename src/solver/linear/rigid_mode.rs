@@ -1,6 +1,11 @@
 //! The motion of a body that keeps its shape.
 
-use crate::math::{Mat3, Vec3, centre_of_mass, inertia_about, skew, solve_semidefinite};
+use crate::math::{Mat3, Vec3, centre_of_mass, inertia_about, skew, solve_without_small};
+
+/// Share of the largest moment of inertia below which what keeps its shape does not turn about that axis, and such a turn is not bent to a
+/// finite one: a rod that sags by a hundredth of its length has 6e-4. It turns about itself by any angle, which would stretch it
+/// and lead its other turns astray.
+pub(crate) const SLENDER: f64 = 1.0e-3;
 
 /// How a body moves that keeps its shape: displacements about its centre of mass.
 #[derive(Default)]
@@ -15,7 +20,7 @@ pub(crate) struct RigidMode {
 pub(crate) fn rigid_mobility(x: &[Vec3], masses: &[f64], mobility: f64) -> (Vec3, f64, Mat3) {
     let (total, centre) = centre_of_mass(x, masses);
     let inertia = inertia_about(&centre, x, masses);
-    let turned = [0, 1, 2].map(|c| solve_semidefinite(&inertia, &Vec3::ith(c, 1.0)) * mobility);
+    let turned = [0, 1, 2].map(|c| solve_without_small(&inertia, &Vec3::ith(c, 1.0), SLENDER) * mobility);
     (centre, mobility / total, Mat3::from_columns(&turned))
 }
 
