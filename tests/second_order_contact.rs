@@ -238,3 +238,29 @@ fn what_is_attached_swings_on() {
     assert!((attached - pinned).abs() < 0.1 * (pinned - first), "{attached} {pinned} {first}");
     assert!((carried - 1.0).abs() < 0.02, "{carried}");
 }
+
+#[test]
+fn drag_takes_spin_and_speed_on_a_floor() {
+    let (mut physics, _) = world_with_floor(1.0 / 60.0);
+    physics.colliders.iter_mut().for_each(|(_, collider)| collider.set_friction(0.0));
+    for drag in [1.0, 100.0] {
+        let mut world = DeformableWorld::new();
+        let block = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.2, 0.5), [3, 1, 3])
+            .material(DeformableMaterial::new(1e6, 0.3).friction(0.0).mass_damping(drag))
+            .translation(Vector::Y * 0.2)
+            .linvel(Vector::X)
+            .angvel(Vector::Y * 5.0)
+            .can_sleep(false)
+            .settings(SolverSettings::default().integrator(Integrator::Bdf2));
+        let block = world.insert(block).unwrap();
+        let spin = world.bodies[block].angular_momentum()[1];
+        for _ in 0..30 {
+            world.step(&mut physics);
+        }
+        let body = &world.bodies[block];
+        let left = [body.linear_momentum()[0] / body.mass(), body.angular_momentum()[1] / spin];
+        let truth = (-drag * 0.5f64).exp();
+        println!("drag {drag} 1/s: {left:.4?} left, exp {truth:.4}");
+        assert!(left.iter().all(|l| (l - truth).abs() < 0.01), "{left:?} {truth}");
+    }
+}

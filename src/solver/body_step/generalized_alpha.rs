@@ -182,15 +182,17 @@ impl BodyProblem {
         let (_, centre) = centre_of_mass(&self.current.x, &self.masses);
         let drag = self.material.mass_damping;
         let mut linear = (centre - centre_before) * (-mass * drag);
-        let mut angular = self.spin * (1.0 - drag * self.dt);
+        let (mut angular, mut held) = (self.spin, Vec3::zeros());
         for (i, m) in self.masses.iter().enumerate() {
             let impulse = (self.fall[i] * *m + self.contact_force[i]) * self.dt;
             let arms = [self.x_start[i] - centre_before, self.current.x[i] - centre];
             linear += impulse + (self.v_start[i] - v[i]) * *m;
-            angular += ((arms[0] + arms[1]) * 0.5).cross(&impulse) - arms[1].cross(&v[i]) * *m;
+            angular += ((arms[0] + arms[1]) * 0.5).cross(&impulse);
+            held += arms[1].cross(&v[i]) * *m;
         }
         let inertia = inertia_about(&centre, &self.current.x, &self.masses);
-        let turn = solve_semidefinite(&inertia, &angular);
+        let missing = angular / (1.0 + drag * self.dt) - held;
+        let turn = solve_semidefinite(&inertia, &missing);
         for (v, x) in v.iter_mut().zip(&self.current.x) {
             *v += linear / mass + turn.cross(&(x - centre));
         }
