@@ -84,19 +84,23 @@ mod pipeline;
 
 pub use body::{
     Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
-    DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableState, FactorPrecision,
-    Fidelity, Frames, Integrator, JointRole, Solver, SolverSettings,
+    DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableContactPartner,
+    DeformableState, FactorPrecision, Fidelity, Frames, Integrator, JointRole, Solver, SolverSettings,
 };
 pub use contact::DeformableSurfacePoint;
-pub use coupling::PhysicsParts;
+pub use coupling::{
+    DeformableContactModificationContext, DeformableHooks, DeformablePairFilterContext,
+    DeformableSolverContact, PhysicsParts,
+};
 pub use energy::Elasticity;
 pub use error::{BodyError, DeformableBodyError, HandleError};
 pub use fem::{DeformableModel, SystemMatrix};
 pub use material::{DeformableMaterial, MaterialError};
 pub use mesh::{MeshError, Structure, TetMesh};
 pub use pipeline::{
-    DeformableContact, DeformableCounters, DeformablePairContact, DeformableParameters, DeformablePipeline,
-    DeformableWorld, JointForce, RigidContact, SolvedJoint,
+    DeformableChannelEventCollector, DeformableCollisionEvent, DeformableContact,
+    DeformableContactForceEvent, DeformableCounters, DeformableEventHandler, DeformablePairContact,
+    DeformableParameters, DeformablePipeline, DeformableWorld, JointForce, RigidContact, SolvedJoint,
 };
 
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
@@ -104,10 +108,13 @@ pub mod prelude {
     pub use crate::{
         Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
         DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
-        DeformableContact, DeformableCounters, DeformableMaterial, DeformableModel, DeformablePairContact,
-        DeformableParameters, DeformablePipeline, DeformableSurfacePoint, DeformableWorld, Elasticity,
-        FactorPrecision, Fidelity, Frames, Integrator, JointForce, JointRole, PhysicsParts, RigidContact,
-        SolvedJoint, Solver, SolverSettings, Structure, SystemMatrix, TetMesh,
+        DeformableChannelEventCollector, DeformableCollisionEvent, DeformableContact,
+        DeformableContactForceEvent, DeformableContactModificationContext, DeformableContactPartner,
+        DeformableCounters, DeformableEventHandler, DeformableHooks, DeformableMaterial, DeformableModel,
+        DeformablePairContact, DeformablePairFilterContext, DeformableParameters, DeformablePipeline,
+        DeformableSolverContact, DeformableSurfacePoint, DeformableWorld, Elasticity, FactorPrecision,
+        Fidelity, Frames, Integrator, JointForce, JointRole, PhysicsParts, RigidContact, SolvedJoint, Solver,
+        SolverSettings, Structure, SystemMatrix, TetMesh,
     };
 }
 

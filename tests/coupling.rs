@@ -247,6 +247,7 @@ fn events_and_hooks_reach_rapier() {
         ) {
         }
     }
+    impl DeformableEventHandler for Count {}
     let (mut physics, _) = world_with_floor(1.0 / 60.0);
     let ball = ColliderBuilder::ball(0.1).active_events(ActiveEvents::COLLISION_EVENTS);
     physics.insert(RigidBodyBuilder::dynamic().translation(Vector::Y * 0.2).can_sleep(false), ball);

@@ -12,6 +12,7 @@ use parry3d::bounding_volume::Aabb;
 use rapier3d::dynamics::CoefficientCombineRule;
 use rapier3d::geometry::InteractionGroups;
 use rapier3d::math::{Rotation, Vector};
+use rapier3d::pipeline::{ActiveEvents, ActiveHooks};
 use std::sync::Arc;
 
 /// A vertex held in place, or led along by its user.
@@ -55,6 +56,9 @@ pub struct DeformableBody {
     pub(super) collision_groups: InteractionGroups,
     pub(super) friction_combine_rule: CoefficientCombineRule,
     pub(super) restitution_combine_rule: CoefficientCombineRule,
+    pub(super) active_events: ActiveEvents,
+    pub(super) active_hooks: ActiveHooks,
+    pub(super) contact_force_event_threshold: f32,
     /// Free for the user.
     pub user_data: u128,
 }
@@ -67,6 +71,7 @@ impl DeformableBody {
             contacts: Vec::new(),
             shared: Vec::new(),
             impacts: Vec::new(),
+            pair_data: Vec::new(),
             history: History::default(),
             sleep: Sleep::default(),
             factor_base: FactorBase::default(),
@@ -87,6 +92,9 @@ impl DeformableBody {
             collision_groups: InteractionGroups::all(),
             friction_combine_rule: CoefficientCombineRule::Average,
             restitution_combine_rule: CoefficientCombineRule::Average,
+            active_events: ActiveEvents::empty(),
+            active_hooks: ActiveHooks::empty(),
+            contact_force_event_threshold: 0.0,
             user_data: 0,
         }
     }

@@ -10,6 +10,7 @@ use parry3d::shape::Shape;
 use rapier3d::dynamics::CoefficientCombineRule;
 use rapier3d::geometry::InteractionGroups;
 use rapier3d::math::{Pose, Rotation, Vector};
+use rapier3d::pipeline::{ActiveEvents, ActiveHooks};
 use std::fmt;
 use std::sync::Arc;
 
@@ -44,6 +45,9 @@ pub struct DeformableBodyBuilder {
     collision_groups: InteractionGroups,
     friction_combine_rule: CoefficientCombineRule,
     restitution_combine_rule: CoefficientCombineRule,
+    active_events: ActiveEvents,
+    active_hooks: ActiveHooks,
+    contact_force_event_threshold: f32,
     user_data: u128,
 }
 
@@ -149,6 +153,9 @@ impl DeformableBodyBuilder {
             collision_groups: InteractionGroups::all(),
             friction_combine_rule: CoefficientCombineRule::Average,
             restitution_combine_rule: CoefficientCombineRule::Average,
+            active_events: ActiveEvents::empty(),
+            active_hooks: ActiveHooks::empty(),
+            contact_force_event_threshold: 0.0,
             user_data: 0,
         }
     }
@@ -264,6 +271,25 @@ impl DeformableBodyBuilder {
         self
     }
 
+    /// Sets which events the body gives rise to, see [`DeformableEventHandler`](crate::DeformableEventHandler).
+    pub fn active_events(mut self, events: ActiveEvents) -> Self {
+        self.active_events = events;
+        self
+    }
+
+    /// Sets which hooks are asked about the body, see [`DeformableHooks`](crate::DeformableHooks).
+    pub fn active_hooks(mut self, hooks: ActiveHooks) -> Self {
+        self.active_hooks = hooks;
+        self
+    }
+
+    /// Sets the force \[N\] above which the body's contacts give rise to events, see
+    /// [`DeformableBody::set_contact_force_event_threshold`].
+    pub fn contact_force_event_threshold(mut self, threshold: f32) -> Self {
+        self.contact_force_event_threshold = threshold;
+        self
+    }
+
     /// Sets the user's data.
     pub fn user_data(mut self, data: u128) -> Self {
         self.user_data = data;
@@ -287,6 +313,9 @@ impl DeformableBodyBuilder {
         body.set_collision_groups(self.collision_groups);
         body.set_friction_combine_rule(self.friction_combine_rule);
         body.set_restitution_combine_rule(self.restitution_combine_rule);
+        body.set_active_events(self.active_events);
+        body.set_active_hooks(self.active_hooks);
+        body.set_contact_force_event_threshold(self.contact_force_event_threshold);
         body.user_data = self.user_data;
         if let Some(condition) = &self.pinned {
             for vertex in body.vertices_where(|x| condition(x)) {

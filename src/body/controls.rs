@@ -5,6 +5,7 @@ use super::settings::{Acceleration, SolverSettings};
 use crate::material::{DeformableMaterial, MaterialError};
 use rapier3d::dynamics::CoefficientCombineRule;
 use rapier3d::geometry::InteractionGroups;
+use rapier3d::pipeline::{ActiveEvents, ActiveHooks};
 
 /// Clusters of a body at the most.
 const MAX_CLUSTERS: usize = 32;
@@ -116,6 +117,38 @@ impl DeformableBody {
     pub fn set_collision_groups(&mut self, groups: InteractionGroups) {
         self.wake_up();
         self.collision_groups = groups;
+    }
+
+    /// Which events the body gives rise to.
+    pub fn active_events(&self) -> ActiveEvents {
+        self.active_events
+    }
+
+    /// Sets which events the body gives rise to; those of what it touches count too, by rapier's rules.
+    pub fn set_active_events(&mut self, events: ActiveEvents) {
+        self.active_events = events;
+    }
+
+    /// Which hooks are asked about the body.
+    pub fn active_hooks(&self) -> ActiveHooks {
+        self.active_hooks
+    }
+
+    /// Sets which hooks are asked about the body; those of what it touches count too, by rapier's rules.
+    pub fn set_active_hooks(&mut self, hooks: ActiveHooks) {
+        self.wake_up();
+        self.active_hooks = hooks;
+    }
+
+    /// Force \[N\] above which [`ActiveEvents::CONTACT_FORCE_EVENTS`] of the body give rise to events.
+    pub fn contact_force_event_threshold(&self) -> f32 {
+        self.contact_force_event_threshold
+    }
+
+    /// Sets the force \[N\] above which [`ActiveEvents::CONTACT_FORCE_EVENTS`] of the body give rise to events; the sum of
+    /// the magnitudes of what its contacts with one partner carry. Of two thresholds the smaller counts.
+    pub fn set_contact_force_event_threshold(&mut self, threshold: f32) {
+        self.contact_force_event_threshold = threshold;
     }
 
     /// How friction combines with that of what it touches.

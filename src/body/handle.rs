@@ -2,6 +2,8 @@
 
 use crate::error::HandleError;
 use rapier3d::data::arena::Index;
+use rapier3d::geometry::ColliderHandle;
+use std::cmp::Ordering;
 
 /// Names a body of a [`DeformableBodySet`](super::DeformableBodySet). Generational: a handle of a removed body never names
 /// its successor.
@@ -23,3 +25,34 @@ impl DeformableBodyHandle {
 /// Names an attachment of a [`DeformableBodySet`](super::DeformableBodySet); never used again after its removal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct DeformableAttachmentHandle(pub(crate) u64);
+
+/// What a deformable body touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum DeformableContactPartner {
+    /// A rapier collider.
+    Collider(ColliderHandle),
+    /// Another deformable body.
+    Deformable(DeformableBodyHandle),
+}
+
+impl DeformableContactPartner {
+    fn rank(self) -> (bool, (u32, u32)) {
+        match self {
+            Self::Collider(handle) => (false, handle.into_raw_parts()),
+            Self::Deformable(handle) => (true, handle.into_raw_parts()),
+        }
+    }
+}
+
+/// Colliders first, then by slot and generation; rapier's handles have no order of their own.
+impl Ord for DeformableContactPartner {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.rank().cmp(&other.rank())
+    }
+}
+
+impl PartialOrd for DeformableContactPartner {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}

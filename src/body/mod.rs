@@ -10,6 +10,7 @@ mod handle;
 mod impact;
 mod settings;
 mod state;
+mod touching;
 
 #[allow(clippy::module_inception)]
 mod body;
@@ -37,10 +38,11 @@ pub(crate) use constraint_memory::{
     AttachmentAxis, AttachmentDirection, ConstraintGeometry, ConstraintKey, ConstraintMemory, Feature,
     JointAxis, ObstacleContact, RigidPairContact, SoftPairContact, SoftPairKind,
 };
-pub use handle::{DeformableAttachmentHandle, DeformableBodyHandle};
+pub use handle::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableContactPartner};
 pub(crate) use impact::{Impact, Partner};
 pub use set::DeformableBodySet;
 pub use settings::{Acceleration, FactorPrecision, Fidelity, Frames, Integrator, Solver, SolverSettings};
 pub(crate) use sleep::TIME_UNTIL_SLEEP;
 pub use state::DeformableState;
 pub(crate) use state::{History, Surroundings, is_number};
+pub(crate) use touching::TouchKey;

@@ -4,6 +4,7 @@ use super::attachment::DeformableAttachment;
 use super::body::DeformableBody;
 use super::builder::DeformableBodyBuilder;
 use super::handle::{DeformableAttachmentHandle, DeformableBodyHandle};
+use super::touching::{Touch, TouchKey};
 use crate::error::DeformableBodyError;
 use crate::math::Vec3;
 use rapier3d::data::arena::Arena;
@@ -19,6 +20,8 @@ pub struct DeformableBodySet {
     attached: u64,
     /// Rigid bodies that slept with bodies that were removed, for the next step to wake.
     released: Vec<RigidBodyHandle>,
+    /// What touches what, where events are wanted of it.
+    pub(crate) touching: BTreeMap<TouchKey, Touch>,
 }
 
 impl DeformableBodySet {
@@ -134,6 +137,23 @@ impl DeformableBodySet {
     /// All bodies, to be changed.
     pub fn iter_mut(&mut self) -> impl Iterator<Item = (DeformableBodyHandle, &mut DeformableBody)> {
         self.bodies.iter_mut().map(|(i, b)| (DeformableBodyHandle(i), b))
+    }
+
+    /// Whether a handle names a body of this set.
+    pub fn contains(&self, handle: DeformableBodyHandle) -> bool {
+        self.bodies.contains(handle.0)
+    }
+
+    /// Two bodies at once, to be changed; `None` for the second if both are the same.
+    pub fn get_pair_mut(
+        &mut self,
+        first: DeformableBodyHandle,
+        second: DeformableBodyHandle,
+    ) -> (Option<&mut DeformableBody>, Option<&mut DeformableBody>) {
+        if first == second {
+            return (self.get_mut(first), None);
+        }
+        self.bodies.get2_mut(first.0, second.0)
     }
 
     /// Number of bodies.

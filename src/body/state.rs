@@ -3,7 +3,7 @@
 use super::constraint_memory::{ConstraintKey, ConstraintMemory};
 use super::factor_base::FactorBase;
 use super::handle::DeformableBodyHandle;
-use super::impact::Impact;
+use super::impact::{Impact, Partner};
 use crate::math::{Pose64, Vec3};
 use rapier3d::dynamics::RigidBodyHandle;
 
@@ -22,6 +22,8 @@ pub struct DeformableState {
     pub(crate) shared: Vec<ConstraintMemory>,
     /// What it hits and has not parted from, with restitution.
     pub(crate) impacts: Vec<Impact>,
+    /// What hooks have noted of the pairs that it is in, with the partner, packed.
+    pub(crate) pair_data: Vec<(Partner, u32)>,
     /// Where the last step began, of bodies that go forward by two.
     pub(crate) history: History,
     pub(crate) sleep: Sleep,

@@ -44,6 +44,8 @@ pub(crate) struct Constraint {
     /// Displacement per force that the constraint itself gives way by [m/N].
     pub compliance: f64,
     pub restitution: f64,
+    /// Motion over the step of the surface of endpoint 1 along itself, beside the endpoint's own \[m\].
+    pub surface_motion: Vec3,
     pub key: ConstraintKey,
     /// Force on endpoint 0 in the last step \[N\].
     pub warm_force: Vec3,
@@ -66,6 +68,7 @@ impl Constraint {
             law: Law::Contact { friction: 0.0 },
             compliance: 0.0,
             restitution: 0.0,
+            surface_motion: Vec3::zeros(),
             key,
             warm_force: Vec3::zeros(),
             warm_shift_rate: 0.0,

@@ -107,14 +107,7 @@ impl DeformableBodySet {
     ) -> impl Iterator<Item = DeformableBodyHandle> + 'a {
         let aabb = shape.compute_aabb(&pose);
         let near = self.iter().filter(move |(_, b)| b.is_enabled() && b.aabb().intersects(&aabb));
-        let meets = move |body: &DeformableBody| {
-            let cuts = |triangle: Triangle| {
-                intersection_test(&pose, shape, &Pose::IDENTITY, &triangle)
-                    .is_ok_and(|found| found.intersecting)
-            };
-            triangles(body).any(|(_, triangle)| cuts(triangle)) || lies_in(body, &pose, shape)
-        };
-        near.filter(move |(_, body)| meets(body)).map(|(handle, _)| handle)
+        near.filter(move |(_, body)| overlaps(body, &pose, shape)).map(|(handle, _)| handle)
     }
 
     fn on_surface(
@@ -137,6 +130,17 @@ impl DeformableBodySet {
             distance,
         })
     }
+}
+
+/// Whether a shape touches a body or lies in it.
+pub(crate) fn overlaps(body: &DeformableBody, pose: &Pose, shape: &dyn Shape) -> bool {
+    let aabb = shape.compute_aabb(pose);
+    let cuts = |triangle: Triangle| {
+        triangle.local_aabb().intersects(&aabb)
+            && intersection_test(pose, shape, &Pose::IDENTITY, &triangle)
+                .is_ok_and(|found| found.intersecting)
+    };
+    triangles(body).any(|(_, triangle)| cuts(triangle)) || lies_in(body, pose, shape)
 }
 
 /// The triangles of a surface with their vertices.

@@ -4,6 +4,7 @@
 //! moves and which groups collide.
 //! Everything below works on obstacles, proxies and constraints.
 
+mod hooks;
 mod parts;
 
 mod coefficients;
@@ -28,6 +29,11 @@ mod tests;
 
 pub(crate) use attachments::{SteppedBodies, attached_nodes, attachment_constraints, prescribed_nodes};
 pub(crate) use coefficients::{combined, combined_between};
+pub use hooks::{
+    DeformableContactModificationContext, DeformableHooks, DeformablePairFilterContext,
+    DeformableSolverContact,
+};
+pub(crate) use hooks::{HookedPair, pose_of};
 pub(crate) use neighbourhood::{RigidNeighbourhood, WalkContext};
 pub use parts::PhysicsParts;
 pub(crate) use parts::{RapierSets, StepContext, body_handle, collider_handle, impulse_joint_handle, packed};

@@ -1,5 +1,6 @@
 //! The parts of a rapier world that a step needs.
 
+use super::hooks::DeformableHooks;
 use crate::math::{Vec3, to_real};
 use rapier3d::dynamics::{
     ImpulseJointHandle, ImpulseJointSet, MultibodyJointSet, RigidBodyHandle, RigidBodySet,
@@ -93,6 +94,7 @@ pub(crate) struct StepContext<'a> {
     pub gravity: Vec3,
     /// Length of the step \[s\].
     pub h: f64,
+    pub hooks: &'a dyn DeformableHooks,
 }
 
 impl StepContext<'_> {

@@ -20,6 +20,8 @@ pub(crate) struct RapierScene {
     pub proxies: RigidProxies,
     /// Rigid body of each proxy; none for colliders without one.
     pub handles: Vec<Option<RigidBodyHandle>>,
+    /// Sensors that are enabled.
+    pub sensors: Vec<ColliderHandle>,
     /// Collider of each obstacle.
     pub colliders: Vec<ColliderHandle>,
     pub(super) articulated: Vec<ArticulatedLinks>,
@@ -35,14 +37,19 @@ impl RapierScene {
         self.handles.clear();
         self.colliders.clear();
         self.articulated.clear();
+        self.sensors.clear();
         self.proxy_of_body.clear();
         self.meshes.begin();
         for (handle, collider) in context.sets.colliders.iter() {
-            if !collider.is_enabled() || collider.is_sensor() {
+            if !collider.is_enabled() {
                 continue;
             }
             let body = collider.parent().and_then(|h| Some((h, context.sets.bodies.get(h)?)));
             if body.is_some_and(|(_, b)| !b.is_enabled() || b.is_soft_frame() || b.soft_body().is_some()) {
+                continue;
+            }
+            if collider.is_sensor() {
+                self.sensors.push(handle);
                 continue;
             }
             let (proxy, start, end) = match body {

@@ -1,6 +1,7 @@
 //! What users name of a step: the world, the pipeline, its parameters, counters and contacts; and the step itself.
 
 mod contacts;
+mod events;
 mod parameters;
 
 mod step;
@@ -11,6 +12,10 @@ mod pipeline;
 mod world;
 
 pub use contacts::{DeformableContact, DeformablePairContact, JointForce, RigidContact, SolvedJoint};
+pub use events::{
+    DeformableChannelEventCollector, DeformableCollisionEvent, DeformableContactForceEvent,
+    DeformableEventHandler,
+};
 pub use parameters::{DeformableCounters, DeformableParameters};
 pub use pipeline::DeformablePipeline;
 pub use world::DeformableWorld;

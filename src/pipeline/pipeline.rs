@@ -1,12 +1,14 @@
 //! The pipeline as games with their own loop call it.
 
 use super::contacts::{DeformableContact, DeformablePairContact, JointForce, RigidContact};
+use super::events::{DeformableCollisionEvent, DeformableContactForceEvent, DeformableEventHandler};
 use super::parameters::{DeformableCounters, DeformableParameters};
 use super::step::StepScratch;
 use crate::body::{DeformableBodySet, Integrator};
-use crate::coupling::PhysicsParts;
+use crate::coupling::{DeformableHooks, PhysicsParts};
 use crate::error::DeformableBodyError;
 use crate::solver::{FactorKey, SECOND_ORDER, alpha_step};
+use rapier3d::geometry::ColliderSet;
 use std::fmt;
 
 /// Steps deformable bodies beside rapier: for games with their own loop and sets. Holds memory and
@@ -69,7 +71,44 @@ impl DeformablePipeline {
         deformables: &mut DeformableBodySet,
         parts: &mut PhysicsParts<'_>,
     ) {
-        self.scratch.run(parameters, deformables, parts);
+        self.before_step_with_hooks(parameters, deformables, parts, &());
+    }
+
+    /// As [`DeformablePipeline::before_step`], with hooks for pairs of deformable bodies.
+    pub fn before_step_with_hooks(
+        &mut self,
+        parameters: &DeformableParameters,
+        deformables: &mut DeformableBodySet,
+        parts: &mut PhysicsParts<'_>,
+        hooks: &dyn DeformableHooks,
+    ) {
+        self.scratch.run(parameters, deformables, parts, hooks);
+    }
+
+    /// Hands the events of the last step to a handler: [`DeformablePipeline::collision_events`], then
+    /// [`DeformablePipeline::contact_force_events`].
+    pub fn send_events(
+        &self,
+        deformables: &DeformableBodySet,
+        colliders: &ColliderSet,
+        handler: &dyn DeformableEventHandler,
+    ) {
+        for event in self.collision_events() {
+            handler.handle_deformable_collision_event(deformables, colliders, *event);
+        }
+        for event in self.contact_force_events() {
+            handler.handle_deformable_contact_force_event(deformables, colliders, event);
+        }
+    }
+
+    /// What has started and stopped touching in the last step.
+    pub fn collision_events(&self) -> &[DeformableCollisionEvent] {
+        &self.scratch.collision_events
+    }
+
+    /// Forces of the last step that were above their thresholds.
+    pub fn contact_force_events(&self) -> &[DeformableContactForceEvent] {
+        &self.scratch.contact_force_events
     }
 
     /// Puts the users' forces and motors back. To be called after rapier's step.

@@ -1,14 +1,15 @@
 //! Deformable bodies beside a rapier `PhysicsWorld`.
 
 use super::contacts::{DeformableContact, DeformablePairContact, RigidContact, SolvedJoint};
+use super::events::{DeformableCollisionEvent, DeformableContactForceEvent, DeformableEventHandler};
 use super::parameters::{DeformableCounters, DeformableParameters};
 use super::pipeline::DeformablePipeline;
 use crate::body::{DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet};
-use crate::coupling::PhysicsParts;
+use crate::coupling::{DeformableHooks, PhysicsParts};
 use crate::error::DeformableBodyError;
 use rapier3d::geometry::ColliderHandle;
 use rapier3d::math::Vector;
-use rapier3d::pipeline::{EventHandler, PhysicsHooks, PhysicsWorld};
+use rapier3d::pipeline::PhysicsWorld;
 
 /// All deformable bodies of a scene, stepped together with a rapier world. `dt` and gravity are the
 /// rapier world's: one truth.
@@ -77,16 +78,29 @@ impl DeformableWorld {
         self.step_with_events(physics, &(), &());
     }
 
-    /// One step, with rapier's hooks and event handler passed on to it.
+    /// One step, with hooks and an event handler, for pairs with deformable bodies and for rapier's own. A handler of
+    /// rapier's serves with an empty `impl` of [`DeformableEventHandler`], hooks with one of [`DeformableHooks`].
     pub fn step_with_events(
         &mut self,
         physics: &mut PhysicsWorld,
-        hooks: &dyn PhysicsHooks,
-        events: &dyn EventHandler,
+        hooks: &dyn DeformableHooks,
+        events: &dyn DeformableEventHandler,
     ) {
-        self.pipeline.before_step(&self.parameters, &mut self.bodies, &mut PhysicsParts::from(&mut *physics));
+        let mut parts = PhysicsParts::from(&mut *physics);
+        self.pipeline.before_step_with_hooks(&self.parameters, &mut self.bodies, &mut parts, hooks);
+        self.pipeline.send_events(&self.bodies, &physics.colliders, events);
         physics.step_with_events(hooks, events);
         self.pipeline.after_step(&mut PhysicsParts::from(physics));
+    }
+
+    /// What has started and stopped touching deformable bodies in the last step.
+    pub fn collision_events(&self) -> &[DeformableCollisionEvent] {
+        self.pipeline.collision_events()
+    }
+
+    /// Forces between deformable bodies and others that were above their thresholds in the last step.
+    pub fn contact_force_events(&self) -> &[DeformableContactForceEvent] {
+        self.pipeline.contact_force_events()
     }
 
     /// Contacts of the last step; of sleeping bodies those with which they fell asleep.

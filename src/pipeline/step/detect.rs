@@ -96,7 +96,7 @@ impl StepScratch {
         let (scene, candidates) = (&self.scene, &self.candidates);
         for_each(&mut self.works[first..], |work| {
             let body = &deformables[work.handle];
-            work.detect(body, scene, candidates, context.sets);
+            work.detect(deformables, scene, candidates, context);
             work.look_ahead(body, scene, candidates);
         });
     }
@@ -108,7 +108,7 @@ impl StepScratch {
         context: &StepContext<'_>,
     ) {
         loop {
-            self.soft_pairs.find(&mut self.works, deformables);
+            self.soft_pairs.find(&mut self.works, deformables, context);
             if self.soft_pairs.woken.is_empty() {
                 break;
             }
@@ -128,7 +128,7 @@ impl StepScratch {
         // What is left belongs to bodies that sleep, were removed or disabled.
         self.idle.clear();
         self.linking.clear();
-        self.soft_pairs.add_constraints(&self.works, deformables, &mut self.linking);
+        self.soft_pairs.add_constraints(&mut self.works, deformables, &mut self.linking);
         let counters = &mut self.counters;
         counters.bodies = self.works.len();
         counters.pairs = self.soft_pairs.pair_count() + self.works.iter().map(|w| w.pairs).sum::<usize>();

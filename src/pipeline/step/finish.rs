@@ -27,6 +27,7 @@ impl StepScratch {
                     store(body, work, local, h, &mut self.counters);
                     let problem = &work.island.bodies[local];
                     body.report.is_rejected = problem.is_rejected;
+                    body.state.pair_data.clone_from(&self.works[index].pair_data);
                     self.works[index].tunnelling.stop(body, problem.is_rejected, h);
                     self.counters.rejected_steps += usize::from(problem.is_rejected);
                     give_forces(&work.island.bodies[local], deformables);

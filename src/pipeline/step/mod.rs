@@ -1,8 +1,8 @@
 //! The step, told as a list of verbs.
 //!
 //! ```text
-//! read_obstacles → wake → predict → detect → detect_soft_pairs → attach → walk_neighbourhood →
-//! choose_integration_order → prepare_factors → form_islands → solve → stop_tunnelling → advance → fall_asleep →
+//! read_obstacles → sense → wake → predict → detect → detect_soft_pairs → attach → walk_neighbourhood →
+//! choose_integration_order → prepare_factors → form_islands → solve → stop_tunnelling → advance → fall_asleep → tell_events →
 //! hand over reactions → (rapier steps) → after_step
 //! ```
 
@@ -11,6 +11,7 @@ mod tunnelling;
 
 mod work;
 
+mod events;
 mod islands;
 mod readout;
 mod sleeping;

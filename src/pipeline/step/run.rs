@@ -2,7 +2,7 @@
 
 use super::scratch::StepScratch;
 use crate::body::{DeformableBody, DeformableBodySet};
-use crate::coupling::{PhysicsParts, StepContext};
+use crate::coupling::{DeformableHooks, PhysicsParts, StepContext};
 use crate::math::from_real;
 use crate::pipeline::{DeformableCounters, DeformableParameters};
 use crate::profiler::Stopwatch;
@@ -14,7 +14,10 @@ impl StepScratch {
         parameters: &DeformableParameters,
         deformables: &mut DeformableBodySet,
         parts: &mut PhysicsParts<'_>,
+        hooks: &dyn DeformableHooks,
     ) {
+        self.collision_events.clear();
+        self.contact_force_events.clear();
         self.counters = DeformableCounters::default();
         self.rigid_contacts.clear();
         self.joint_forces.clear();
@@ -28,7 +31,8 @@ impl StepScratch {
             return;
         }
         parts.wake(&deformables.take_released());
-        let context = StepContext { sets: parts.sets(), gravity: from_real(gravity), h: f64::from(dt) };
+        let context =
+            StepContext { sets: parts.sets(), gravity: from_real(gravity), h: f64::from(dt), hooks };
         self.solve_bodies(parameters, deformables, &context);
         let mut clock = Stopwatch::start();
         let asleep = &self.sleeping.rigid;
@@ -46,6 +50,7 @@ impl StepScratch {
         let limits = parameters.contact_limits();
         let mut clock = Stopwatch::start();
         self.read_obstacles(context);
+        self.sense(deformables, context);
         self.wake(deformables, context);
         self.predict(deformables, context, limits.recovery_speed * context.h);
         self.detect(deformables, context, 0);
@@ -63,6 +68,7 @@ impl StepScratch {
         self.stop_tunnelling(&limits, context.h);
         self.advance(deformables, context.h);
         self.fall_asleep(deformables, context);
+        self.tell_events(deformables, context);
         self.counters.advance_time = clock.lap();
     }
 

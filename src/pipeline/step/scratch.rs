@@ -1,5 +1,6 @@
 //! What a step works in: memory and caches, nothing that results depend on.
 
+use super::events::Touching;
 use super::islands::Grouping;
 use super::sleeping::Sleeping;
 use super::soft_pairs::SoftPairDetection;
@@ -8,7 +9,8 @@ use crate::body::{DeformableBodyHandle, PrescribedNode};
 use crate::contact::{Candidates, Constraint, ProxyId};
 use crate::coupling::{RapierScene, Reactions, RigidNeighbourhood};
 use crate::pipeline::{
-    DeformableContact, DeformableCounters, DeformablePairContact, JointForce, RigidContact,
+    DeformableCollisionEvent, DeformableContact, DeformableContactForceEvent, DeformableCounters,
+    DeformablePairContact, JointForce, RigidContact,
 };
 use crate::solver::{FactorCache, Reaction};
 use std::collections::HashMap;
@@ -37,6 +39,9 @@ pub(in crate::pipeline) struct StepScratch {
     pub(super) attached: Vec<(DeformableBodyHandle, ProxyId, u32)>,
     /// Constraints of attachments and of contacts between deformables.
     pub(super) linking: Vec<Constraint>,
+    pub(super) touching: Touching,
+    pub(in crate::pipeline) collision_events: Vec<DeformableCollisionEvent>,
+    pub(in crate::pipeline) contact_force_events: Vec<DeformableContactForceEvent>,
     pub(super) reaction_list: Vec<Reaction>,
     pub(in crate::pipeline) reactions: Reactions,
     pub(in crate::pipeline) contacts: Vec<DeformableContact>,

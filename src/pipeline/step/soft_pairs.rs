@@ -1,9 +1,9 @@
 //! Deformable bodies that come near one another, and the contacts between them.
 
 use super::work::BodyWork;
-use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet};
+use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Partner};
 use crate::contact::{BoxTree, Constraint, Endpoint, SoftDetector, SoftPair};
-use crate::coupling::combined_between;
+use crate::coupling::{HookedPair, StepContext, combined_between};
 use crate::threads::for_each;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use std::collections::HashMap;
@@ -39,15 +39,22 @@ struct PairDetection {
     pair: SoftPair,
     detector: SoftDetector,
     constraints: Vec<Constraint>,
+    /// What hooks have noted of it.
+    data: Vec<(Partner, u32)>,
 }
 
 impl SoftPairDetection {
     /// Finds the contacts between the bodies being stepped and with those that sleep; the latter are listed
     /// in `woken`.
-    pub fn find(&mut self, works: &mut [BodyWork], deformables: &DeformableBodySet) {
+    pub fn find(
+        &mut self,
+        works: &mut [BodyWork],
+        deformables: &DeformableBodySet,
+        context: &StepContext<'_>,
+    ) {
         self.woken.clear();
         self.update_boxes(works, deformables);
-        self.find_pairs(works, deformables);
+        self.find_pairs(works, deformables, context);
         for work in works.iter_mut() {
             work.has_neighbours = false;
         }
@@ -73,6 +80,9 @@ impl SoftPairDetection {
                 Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => true,
             };
             pair.constraints.retain(|constraint| !constraint.endpoints.iter().all(is_pinned));
+            let hooked = hooked(pair.ends.map(|end| work(end).handle), deformables);
+            pair.data.clear();
+            hooked.modify((deformables, pair.ends[0]), context, &mut pair.constraints, &mut pair.data);
         });
         for pair in self.pairs[..self.count].iter().filter(|pair| !pair.constraints.is_empty()) {
             let sleeping = pair.ends.iter().filter_map(|end| end.checked_sub(works.len()));
@@ -85,10 +95,15 @@ impl SoftPairDetection {
     /// Appends the contacts that were found last, with what bodies remember of them.
     pub fn add_constraints(
         &self,
-        works: &[BodyWork],
+        works: &mut [BodyWork],
         deformables: &DeformableBodySet,
         constraints: &mut Vec<Constraint>,
     ) {
+        for pair in &self.pairs[..self.count] {
+            if let Some(work) = works.get_mut(pair.ends[0]) {
+                work.pair_data.extend_from_slice(&pair.data);
+            }
+        }
         // Pairs with a body that sleeps on have no constraints.
         for pair in self.pairs[..self.count].iter().filter(|pair| !pair.constraints.is_empty()) {
             let body = &deformables[works[pair.ends[0]].handle];
@@ -124,7 +139,7 @@ impl SoftPairDetection {
     }
 
     /// Pairs of bodies whose boxes meet, ascending by their handles.
-    fn find_pairs(&mut self, works: &[BodyWork], deformables: &DeformableBodySet) {
+    fn find_pairs(&mut self, works: &[BodyWork], deformables: &DeformableBodySet, context: &StepContext<'_>) {
         self.attached.clear();
         for (_, attachment) in deformables.attachments().filter(|(_, a)| !a.is_broken()) {
             if let [Some(one), Some(other)] = attachment.bodies() {
@@ -152,7 +167,8 @@ impl SoftPairDetection {
             ends.sort_unstable_by_key(|end| handle(*end));
             let handles = ends.map(handle);
             let [a, b] = handles.map(|h| &deformables[h]);
-            let collide = a.collision_groups().test(b.collision_groups());
+            let collide = a.collision_groups().test(b.collision_groups())
+                && hooked(handles, deformables).may_touch(deformables, context);
             if collide && self.attached.binary_search(&handles).is_err() {
                 self.ends.push(ends);
             }
@@ -167,6 +183,10 @@ impl SoftPairDetection {
             (pair.ends, pair.pair) = (*ends, pair_of(a, b));
         }
     }
+}
+
+fn hooked(handles: [DeformableBodyHandle; 2], deformables: &DeformableBodySet) -> HookedPair<'_> {
+    HookedPair::between(handles.map(|handle| (handle, &deformables[handle])))
 }
 
 fn pair_of(a: &DeformableBody, b: &DeformableBody) -> SoftPair {

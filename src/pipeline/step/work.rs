@@ -3,13 +3,13 @@
 
 use super::tunnelling::TunnellingStops;
 use crate::body::{
-    ConstraintMemory, DeformableAttachmentHandle, DeformableBody, DeformableBodyHandle, DeformableState,
-    PrescribedNode, is_number,
+    ConstraintKey, ConstraintMemory, DeformableAttachmentHandle, DeformableBody, DeformableBodyHandle,
+    DeformableBodySet, DeformableState, Partner, PrescribedNode, is_number,
 };
 use crate::contact::{
     Candidates, Constraint, Detector, Endpoint, Pair, ProxyId, STATIC_MARGIN, SoftSurface, SurfaceTree,
 };
-use crate::coupling::{RapierScene, RapierSets, combined, packed};
+use crate::coupling::{HookedPair, RapierScene, StepContext, combined, packed};
 use crate::math::Vec3;
 use crate::solver::{BodyProblem, FactorId, Island};
 use parry3d::bounding_volume::Aabb;
@@ -25,6 +25,8 @@ pub(super) struct BodyWork {
     pub pairs: usize,
     detector: Detector,
     near: Vec<u32>,
+    /// What hooks have noted of the pairs that the body is in.
+    pub pair_data: Vec<(Partner, u32)>,
     /// Obstacles that the body may touch in this step.
     met: Vec<u32>,
     /// Surface nodes in the order in which they are expected to touch.
@@ -57,6 +59,7 @@ impl BodyWork {
             pairs: 0,
             detector: Detector::default(),
             near: Vec::new(),
+            pair_data: Vec::new(),
             met: Vec::new(),
             ahead: Vec::new(),
             distances: Vec::new(),
@@ -155,24 +158,29 @@ impl BodyWork {
     /// Finds the body's contacts.
     pub fn detect(
         &mut self,
-        body: &DeformableBody,
+        deformables: &DeformableBodySet,
         scene: &RapierScene,
         candidates: &Candidates,
-        sets: RapierSets<'_>,
+        context: &StepContext<'_>,
     ) {
         self.constraints.clear();
         self.met.clear();
+        self.pair_data.clear();
         self.pairs = 0;
+        let body = &deformables[self.handle];
         let Some(problem) = &self.problem else { return };
         let (model, x) = (&problem.model, &body.state.x);
         self.detector.begin(model, x, &problem.target);
         self.extent = self.detector.aabb(model, x);
         candidates.near(&self.extent, &mut self.near);
         for &o in &self.near {
-            let collider = sets.colliders.get(scene.colliders[o as usize]);
-            let Some((friction, restitution)) = collider.and_then(|c| combined(body, c)) else {
+            let handle = scene.colliders[o as usize];
+            let Some(collider) = context.sets.colliders.get(handle) else { continue };
+            let Some((friction, restitution)) = combined(body, collider) else { continue };
+            let hooked = HookedPair::with_collider((self.handle, body), (handle, collider));
+            if !hooked.may_touch(deformables, context) {
                 continue;
-            };
+            }
             self.met.push(o);
             let obstacle = &scene.obstacles[o as usize];
             let pair = Pair { body: self.index, friction, restitution };
@@ -194,8 +202,39 @@ impl BodyWork {
             !pinned || constraint.endpoints.iter().any(yields)
         });
         constraints.sort_unstable_by_key(|constraint| constraint.key);
-        self.tunnelling.begin(&constraints);
         self.constraints = constraints;
+        self.modify_contacts(deformables, scene, context);
+        self.tunnelling.begin(&self.constraints);
+    }
+
+    /// Lets users' hooks change the contacts, collider by collider. Through what they take contacts from nodes may pass.
+    fn modify_contacts(
+        &mut self,
+        deformables: &DeformableBodySet,
+        scene: &RapierScene,
+        context: &StepContext<'_>,
+    ) {
+        let hooks = |o: &u32| {
+            let handle = scene.colliders[*o as usize];
+            let collider = context.sets.colliders.get(handle)?;
+            let pair =
+                HookedPair::with_collider((self.handle, &deformables[self.handle]), (handle, collider));
+            pair.modifies().then_some((handle, pair))
+        };
+        let mut pairs: Vec<_> = self.met.iter().filter_map(hooks).collect();
+        // Parts of a compound are one collider.
+        pairs.dedup_by_key(|(handle, _)| *handle);
+        for (handle, pair) in pairs {
+            let name = packed(handle.into_raw_parts());
+            let is_of = |c: &Constraint| matches!(c.key, ConstraintKey::Obstacle(k) if k.collider == name);
+            let (mut own, rest) = std::mem::take(&mut self.constraints).into_iter().partition(is_of);
+            self.constraints = rest;
+            if pair.modify((deformables, self.index), context, &mut own, &mut self.pair_data) {
+                self.met.retain(|o| scene.colliders[*o as usize] != handle);
+            }
+            self.constraints.append(&mut own);
+            self.constraints.sort_unstable_by_key(|constraint| constraint.key);
+        }
     }
 
     /// Looks for obstacles that a body that touches nothing yet is about to touch, and lists its surface

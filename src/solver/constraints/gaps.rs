@@ -52,7 +52,7 @@ pub(super) fn end(
         + constraint.frame[0].dot(&relative_motion(constraint, bodies, at_trial, context, reactions))
 }
 
-/// How far endpoint 0 has moved against endpoint 1 since the start of the step \[m\]: bodies to where they are `at`,
+/// How far endpoint 0 has moved against the surface at endpoint 1 since the start of the step \[m\]: bodies to where they are `at`,
 /// proxies under these reactions.
 pub(super) fn relative_motion<'a>(
     constraint: &Constraint,
@@ -68,5 +68,5 @@ pub(super) fn relative_motion<'a>(
         }
         _ => context.proxies.displacement(endpoint, reactions, context.h),
     };
-    moved(&constraint.endpoints[0]) - moved(&constraint.endpoints[1])
+    moved(&constraint.endpoints[0]) - moved(&constraint.endpoints[1]) - constraint.surface_motion
 }
