@@ -37,6 +37,9 @@ pub enum BodyError {
         /// The index asked for.
         vertex: usize,
     },
+    /// The body is not led by positions.
+    #[error("the body is not of the type KinematicPositionBased")]
+    NotKinematic,
     /// A value that is NaN or infinite.
     #[error("{quantity} is not finite: {value}")]
     NotFinite {

@@ -85,7 +85,8 @@ mod pipeline;
 pub use body::{
     Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
     DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableContactPartner,
-    DeformableState, FactorPrecision, Fidelity, Frames, Integrator, JointRole, Solver, SolverSettings,
+    DeformableState, DeformableWind, FactorPrecision, Fidelity, Frames, Integrator, JointRole, Solver,
+    SolverSettings,
 };
 pub use contact::DeformableSurfacePoint;
 pub use coupling::{
@@ -112,9 +113,9 @@ pub mod prelude {
         DeformableContactForceEvent, DeformableContactModificationContext, DeformableContactPartner,
         DeformableCounters, DeformableEventHandler, DeformableHooks, DeformableMaterial, DeformableModel,
         DeformablePairContact, DeformablePairFilterContext, DeformableParameters, DeformablePipeline,
-        DeformableSolverContact, DeformableSurfacePoint, DeformableWorld, Elasticity, FactorPrecision,
-        Fidelity, Frames, Integrator, JointForce, JointRole, PhysicsParts, RigidContact, SolvedJoint, Solver,
-        SolverSettings, Structure, SystemMatrix, TetMesh,
+        DeformableSolverContact, DeformableSurfacePoint, DeformableWind, DeformableWorld, Elasticity,
+        FactorPrecision, Fidelity, Frames, Integrator, JointForce, JointRole, PhysicsParts, RigidContact,
+        SolvedJoint, Solver, SolverSettings, Structure, SystemMatrix, TetMesh,
     };
 }
 

@@ -2,14 +2,17 @@
 
 use super::constraint_memory::ConstraintMemory;
 use super::factor_base::FactorBase;
+use super::kinematics::Drive;
 use super::settings::SolverSettings;
+use super::sleep::{STILL_SPEED, TIME_UNTIL_SLEEP};
 use super::state::{DeformableState, History, Sleep};
+use super::wind::DeformableWind;
 use crate::error::BodyError;
 use crate::fem::{DeformableModel, Elements, volume};
 use crate::material::DeformableMaterial;
 use crate::math::{Vec3, from_real, to_real};
 use parry3d::bounding_volume::Aabb;
-use rapier3d::dynamics::CoefficientCombineRule;
+use rapier3d::dynamics::{CoefficientCombineRule, RigidBodyType};
 use rapier3d::geometry::InteractionGroups;
 use rapier3d::math::{Rotation, Vector};
 use rapier3d::pipeline::{ActiveEvents, ActiveHooks};
@@ -20,8 +23,21 @@ use std::sync::Arc;
 pub(crate) struct Pin {
     pub(crate) node: u32,
     pub(crate) target: Vec3,
+    /// Velocity with which the target moves on [m/s].
+    pub(crate) velocity: Vec3,
     /// Force that holds the vertex \[N\], of the last step.
     pub(crate) force: Vec3,
+}
+
+impl Pin {
+    /// A node held at a place.
+    pub(super) fn at(node: usize, target: Vec3) -> Self {
+        Self { node: node as u32, target, velocity: Vec3::zeros(), force: Vec3::zeros() }
+    }
+
+    pub(super) fn moves(&self) -> bool {
+        self.velocity != Vec3::zeros()
+    }
 }
 
 /// How the last step of a body went.
@@ -44,6 +60,11 @@ pub struct DeformableBody {
     pub(crate) material: DeformableMaterial,
     /// Ascending by node.
     pub(crate) pins: Vec<Pin>,
+    /// Pins of its user, while the body is fixed or kinematic and all of its nodes are pinned.
+    pub(super) held_pins: Vec<Pin>,
+    pub(super) body_type: RigidBodyType,
+    pub(super) drive: Drive,
+    pub(super) wind: Option<DeformableWind>,
     /// External force on every node \[N\]; empty while there is none.
     pub(crate) forces: Vec<Vec3>,
     pub(crate) report: StepReport,
@@ -52,6 +73,8 @@ pub struct DeformableBody {
     pub(super) gravity_scale: f64,
     pub(super) enabled: bool,
     pub(super) can_sleep: bool,
+    pub(super) sleep_speed: f64,
+    pub(super) time_until_sleep: f64,
     pub(super) self_contact: bool,
     pub(super) collision_groups: InteractionGroups,
     pub(super) friction_combine_rule: CoefficientCombineRule,
@@ -81,6 +104,10 @@ impl DeformableBody {
             state,
             material,
             pins: Vec::new(),
+            held_pins: Vec::new(),
+            body_type: RigidBodyType::Dynamic,
+            drive: Drive::default(),
+            wind: None,
             forces: Vec::new(),
             report: StepReport::default(),
             settings: SolverSettings::default(),
@@ -88,6 +115,8 @@ impl DeformableBody {
             gravity_scale: 1.0,
             enabled: true,
             can_sleep: true,
+            sleep_speed: STILL_SPEED,
+            time_until_sleep: TIME_UNTIL_SLEEP,
             self_contact: false,
             collision_groups: InteractionGroups::all(),
             friction_combine_rule: CoefficientCombineRule::Average,

@@ -7,7 +7,7 @@ use crate::fem::{Build, DeformableModel};
 use crate::material::DeformableMaterial;
 use crate::mesh::{MeshError, Structure, TetMesh};
 use parry3d::shape::Shape;
-use rapier3d::dynamics::CoefficientCombineRule;
+use rapier3d::dynamics::{CoefficientCombineRule, RigidBodyType};
 use rapier3d::geometry::InteractionGroups;
 use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::pipeline::{ActiveEvents, ActiveHooks};
@@ -35,6 +35,7 @@ pub struct DeformableBodyBuilder {
     material: DeformableMaterial,
     settings: SolverSettings,
     pose: Pose,
+    body_type: RigidBodyType,
     linvel: Vector,
     angvel: Vector,
     pinned: Option<Condition>,
@@ -143,6 +144,7 @@ impl DeformableBodyBuilder {
             material: DeformableMaterial::new(1.0e6, 0.3),
             settings: build.defaults(),
             pose: Pose::IDENTITY,
+            body_type: RigidBodyType::Dynamic,
             linvel: Vector::ZERO,
             angvel: Vector::ZERO,
             pinned: None,
@@ -208,6 +210,12 @@ impl DeformableBodyBuilder {
     /// Sets the pose of the rest mesh in the world.
     pub fn pose(mut self, pose: Pose) -> Self {
         self.pose = pose;
+        self
+    }
+
+    /// Sets what moves the body, see [`DeformableBody::set_body_type`].
+    pub fn body_type(mut self, body_type: RigidBodyType) -> Self {
+        self.body_type = body_type;
         self
     }
 
@@ -304,6 +312,7 @@ impl DeformableBodyBuilder {
         self.material.validate()?;
         let mut body = DeformableBody::new(self.model.clone()?, self.material);
         body.teleport(self.pose)?;
+        body.set_body_type(self.body_type);
         body.set_vels(self.linvel, self.angvel)?;
         body.set_settings(self.settings);
         body.set_gravity_scale(self.gravity_scale);

@@ -16,6 +16,11 @@ impl DeformableBodyHandle {
         self.0.into_raw_parts()
     }
 
+    /// Of a slot and a generation, as [`DeformableBodyHandle::into_raw_parts`] gives them.
+    pub fn from_raw_parts(index: u32, generation: u32) -> Self {
+        Self(Index::from_raw_parts(index, generation))
+    }
+
     pub(crate) fn no_such_body(self) -> HandleError {
         let (index, generation) = self.into_raw_parts();
         HandleError::NoSuchBody { index, generation }

@@ -12,6 +12,8 @@ mod settings;
 mod state;
 mod touching;
 
+mod kinematics;
+
 #[allow(clippy::module_inception)]
 mod body;
 
@@ -21,6 +23,7 @@ mod motion;
 mod pins;
 mod report;
 mod sleep;
+mod wind;
 
 mod builder;
 
@@ -42,7 +45,7 @@ pub use handle::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableCon
 pub(crate) use impact::{Impact, Partner};
 pub use set::DeformableBodySet;
 pub use settings::{Acceleration, FactorPrecision, Fidelity, Frames, Integrator, Solver, SolverSettings};
-pub(crate) use sleep::TIME_UNTIL_SLEEP;
 pub use state::DeformableState;
 pub(crate) use state::{History, Surroundings, is_number};
 pub(crate) use touching::TouchKey;
+pub use wind::DeformableWind;

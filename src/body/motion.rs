@@ -1,9 +1,11 @@
 //! Mass, momentum and energy of a body, and setting it in motion.
 
 use super::body::{DeformableBody, finite, rotation};
+use super::kinematics::Drive;
 use crate::error::BodyError;
 use crate::fem::elastic_forces;
-use crate::math::{Pose64, Vec3, to_real};
+use crate::math::{Mat3, Pose64, Vec3, inertia_about, polar::polar_rotation, solve_semidefinite, to_real};
+use rapier3d::dynamics::RigidBodyType;
 use rapier3d::math::{Pose, Vector};
 
 impl DeformableBody {
@@ -20,6 +22,36 @@ impl DeformableBody {
     /// Velocity of the centre of mass [m/s].
     pub fn linvel(&self) -> [f64; 3] {
         self.weighted_mean(&self.state.v).into()
+    }
+
+    /// Angular velocity [rad/s]: that of the rigid body with the same angular momentum and inertia.
+    pub fn angvel(&self) -> [f64; 3] {
+        let inertia = self.inertia_matrix();
+        solve_semidefinite(&inertia, &Vec3::from(self.angular_momentum())).into()
+    }
+
+    /// Inertia about the centre of mass as the body is now, row by row [kg m²].
+    pub fn inertia(&self) -> [[f64; 3]; 3] {
+        // Symmetric: rows are columns.
+        self.inertia_matrix().into()
+    }
+
+    fn inertia_matrix(&self) -> Mat3 {
+        let masses: Vec<f64> = (0..self.state.x.len()).map(|node| self.node_mass(node)).collect();
+        inertia_about(&self.weighted_mean(&self.state.x), &self.state.x, &masses)
+    }
+
+    /// Where the body is as a whole: the pose of the rest shape that fits its vertices best, by mass [Horn 1987].
+    pub fn pose(&self) -> Pose {
+        self.fitted_pose().to_real()
+    }
+
+    fn fitted_pose(&self) -> Pose64 {
+        let (at_rest, x) = (&self.model.rest, &self.state.x);
+        let [from, to] = [at_rest, x].map(|points| self.weighted_mean(points));
+        let spread = |n: usize| (x[n] - to) * (at_rest[n] - from).transpose() * self.model.node_volumes[n];
+        let rotation = polar_rotation(&(0..x.len()).map(spread).sum::<Mat3>());
+        Pose64 { rotation, translation: to - rotation * from }
     }
 
     /// Linear momentum [kg m/s].
@@ -56,15 +88,37 @@ impl DeformableBody {
         elastic_forces::add_forces(&self.elements(), &at, &mut unused).energy
     }
 
-    /// Sets the velocity of all vertices [m/s].
+    /// Sets the velocity of the centre of mass [m/s]; the body goes on turning and vibrating. Not of one that is fixed or led
+    /// by positions, here and below.
     ///
     /// # Errors
     /// [`BodyError::NotFinite`].
     pub fn set_linvel(&mut self, linvel: Vector) -> Result<(), BodyError> {
-        self.wake_up();
-        self.state.history.clear();
         let linvel = finite("linear velocity", linvel)?;
-        self.state.v.fill(linvel);
+        if !self.takes_velocities() {
+            return Ok(());
+        }
+        self.drive.linvel = linvel;
+        let gain = linvel - self.weighted_mean(&self.state.v);
+        self.state.v.iter_mut().for_each(|v| *v += gain);
+        Ok(())
+    }
+
+    /// Sets the angular velocity about the centre of mass [rad/s]; the body goes on moving and vibrating.
+    ///
+    /// # Errors
+    /// [`BodyError::NotFinite`].
+    pub fn set_angvel(&mut self, angvel: Vector) -> Result<(), BodyError> {
+        let angvel = finite("angular velocity", angvel)?;
+        if !self.takes_velocities() {
+            return Ok(());
+        }
+        self.drive.angvel = angvel;
+        let gain = angvel - Vec3::from(self.angvel());
+        let centre = self.weighted_mean(&self.state.x);
+        for (v, x) in self.state.v.iter_mut().zip(&self.state.x) {
+            *v += gain.cross(&(x - centre));
+        }
         Ok(())
     }
 
@@ -73,15 +127,24 @@ impl DeformableBody {
     /// # Errors
     /// [`BodyError::NotFinite`].
     pub fn set_vels(&mut self, linvel: Vector, angvel: Vector) -> Result<(), BodyError> {
-        self.wake_up();
-        self.state.history.clear();
         let linvel = finite("linear velocity", linvel)?;
         let angvel = finite("angular velocity", angvel)?;
+        if !self.takes_velocities() {
+            return Ok(());
+        }
+        self.drive = Drive { linvel, angvel };
         let centre = self.weighted_mean(&self.state.x);
         for (v, x) in self.state.v.iter_mut().zip(&self.state.x) {
             *v = linvel + angvel.cross(&(x - centre));
         }
         Ok(())
+    }
+
+    /// Makes ready for another velocity, if that moves the body.
+    fn takes_velocities(&mut self) -> bool {
+        self.wake_up();
+        self.state.history.clear();
+        matches!(self.body_type, RigidBodyType::Dynamic | RigidBodyType::KinematicVelocityBased)
     }
 
     /// Sets the velocity of one vertex [m/s].
@@ -109,23 +172,45 @@ impl DeformableBody {
         Ok(())
     }
 
+    /// Puts the body where its rest shape would be at a pose, deformation and all: [`DeformableBody::teleport`] from
+    /// [`DeformableBody::pose`].
+    ///
+    /// # Errors
+    /// [`BodyError::NotFinite`], [`BodyError::NoRotation`].
+    pub fn set_pose(&mut self, pose: Pose) -> Result<(), BodyError> {
+        finite("translation", pose.translation)?;
+        rotation("rotation", pose.rotation)?;
+        let now = self.fitted_pose();
+        self.move_by(&Pose64::from_real(&pose).compose(&now.inverse()));
+        Ok(())
+    }
+
     /// Moves the body as it is, deformation and all, by a rigid motion; pins move along, velocities
     /// turn, its own contacts are forgotten.
     ///
     /// # Errors
     /// [`BodyError::NotFinite`].
     pub fn teleport(&mut self, by: Pose) -> Result<(), BodyError> {
-        self.wake_up();
-        self.state.history.clear();
         finite("translation", by.translation)?;
         rotation("rotation", by.rotation)?;
-        let pose = Pose64::from_real(&by);
+        self.move_by(&Pose64::from_real(&by));
+        Ok(())
+    }
+
+    fn move_by(&mut self, pose: &Pose64) {
+        self.wake_up();
+        self.state.history.clear();
         self.state.x.iter_mut().for_each(|x| *x = pose.transform(x));
         self.state.v.iter_mut().for_each(|v| *v = pose.rotation * *v);
-        self.pins.iter_mut().for_each(|p| p.target = pose.transform(&p.target));
+        for pin in self.pins.iter_mut().chain(&mut self.held_pins) {
+            pin.target = pose.transform(&pin.target);
+            pin.velocity = pose.rotation * pin.velocity;
+        }
+        self.drive.linvel = pose.rotation * self.drive.linvel;
+        self.drive.angvel = pose.rotation * self.drive.angvel;
         self.state.contacts.clear();
         self.state.shared.clear();
         self.state.impacts.clear();
-        Ok(())
+        self.state.pair_data.clear();
     }
 }

@@ -14,10 +14,11 @@ impl DeformableBody {
         self.wake_up();
         self.state.history.clear();
         let node = self.node(vertex)?;
-        let pin = Pin { node: node as u32, target: self.state.x[node], force: Vec3::zeros() };
-        match self.pin_place(node) {
-            Ok(place) => self.pins[place] = pin,
-            Err(place) => self.pins.insert(place, pin),
+        let pin = Pin::at(node, self.state.x[node]);
+        let pins = self.own_pins();
+        match place_of(pins, node) {
+            Ok(place) => pins[place] = pin,
+            Err(place) => pins.insert(place, pin),
         }
         Ok(())
     }
@@ -30,8 +31,8 @@ impl DeformableBody {
         self.wake_up();
         self.state.history.clear();
         let node = self.node(vertex)?;
-        let place = self.pin_place(node);
-        self.pins.remove(place.map_err(|_| BodyError::NotPinned { vertex })?);
+        let pins = self.own_pins();
+        pins.remove(place_of(pins, node).map_err(|_| BodyError::NotPinned { vertex })?);
         Ok(())
     }
 
@@ -41,16 +42,26 @@ impl DeformableBody {
     /// [`BodyError::NoSuchVertex`], [`BodyError::NotPinned`], [`BodyError::NotFinite`].
     pub fn move_pin(&mut self, vertex: usize, target: Vector) -> Result<(), BodyError> {
         self.wake_up();
-        let node = self.node(vertex)?;
-        let place = self.pin_place(node);
-        let place = place.map_err(|_| BodyError::NotPinned { vertex })?;
-        self.pins[place].target = finite("pin target", target)?;
+        let target = finite("pin target", target)?;
+        self.pin_of(vertex)?.target = target;
         Ok(())
     }
 
-    /// The pinned vertices.
+    /// Moves a pinned vertex on with a velocity [m/s], step by step until another one is set; from where it is led.
+    ///
+    /// # Errors
+    /// [`BodyError::NoSuchVertex`], [`BodyError::NotPinned`], [`BodyError::NotFinite`].
+    pub fn set_pin_velocity(&mut self, vertex: usize, velocity: Vector) -> Result<(), BodyError> {
+        self.wake_up();
+        let velocity = finite("pin velocity", velocity)?;
+        self.pin_of(vertex)?.velocity = velocity;
+        Ok(())
+    }
+
+    /// The vertices that its user has pinned.
     pub fn pinned(&self) -> impl ExactSizeIterator<Item = usize> + '_ {
-        self.pins.iter().map(|p| self.model.vertex(p.node as usize))
+        let pins = if self.is_led() { &self.held_pins } else { &self.pins };
+        pins.iter().map(|p| self.model.vertex(p.node as usize))
     }
 
     /// Force \[N\] with which the pins held the body in the last step.
@@ -58,7 +69,19 @@ impl DeformableBody {
         self.pins.iter().map(|p| p.force).sum::<Vec3>().into()
     }
 
-    fn pin_place(&self, node: usize) -> Result<usize, usize> {
-        self.pins.binary_search_by_key(&(node as u32), |p| p.node)
+    /// The pins that its user sets; of fixed and kinematic bodies they wait.
+    fn own_pins(&mut self) -> &mut Vec<Pin> {
+        if self.is_led() { &mut self.held_pins } else { &mut self.pins }
     }
+
+    /// The pin that leads a vertex.
+    fn pin_of(&mut self, vertex: usize) -> Result<&mut Pin, BodyError> {
+        let node = self.node(vertex)?;
+        let place = place_of(&self.pins, node).map_err(|_| BodyError::NotPinned { vertex })?;
+        Ok(&mut self.pins[place])
+    }
+}
+
+fn place_of(pins: &[Pin], node: usize) -> Result<usize, usize> {
+    pins.binary_search_by_key(&(node as u32), |p| p.node)
 }

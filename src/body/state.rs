@@ -74,6 +74,8 @@ impl History {
 pub(crate) struct Sleep {
     /// Time \[s\] for which the body has been still.
     pub still_for: f64,
+    /// Its user has put it to sleep; the next step looks around.
+    pub is_asked: bool,
     pub surroundings: Option<Surroundings>,
     /// Rigid bodies that slept on a body that does so no more, for the next step to wake: what it carried may have nothing
     /// below it.

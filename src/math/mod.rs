@@ -121,11 +121,22 @@ impl Pose64 {
 
     /// Another pose as seen from this one, as parry takes it.
     pub fn relative(&self, other: &Self) -> rapier3d::math::Pose {
-        let rotation = nalgebra::Rotation3::from_matrix_unchecked(self.rotation.tr_mul(&other.rotation));
+        let rotation = self.rotation.tr_mul(&other.rotation);
+        Self { rotation, translation: self.inverse_transform(&other.translation) }.to_real()
+    }
+
+    /// The motion back.
+    pub fn inverse(&self) -> Self {
+        Self { rotation: self.rotation.transpose(), translation: -self.rotation.tr_mul(&self.translation) }
+    }
+
+    /// In rapier's precision.
+    pub fn to_real(self) -> rapier3d::math::Pose {
+        let rotation = nalgebra::Rotation3::from_matrix_unchecked(self.rotation);
         let q = nalgebra::UnitQuaternion::from_rotation_matrix(&rotation);
         let [x, y, z, w] = [q.i, q.j, q.k, q.w].map(|c| c as f32);
-        let translation = to_real(&self.inverse_transform(&other.translation));
-        rapier3d::math::Pose::from_parts(translation, rapier3d::math::Rotation::from_xyzw(x, y, z, w))
+        let rotation = rapier3d::math::Rotation::from_xyzw(x, y, z, w);
+        rapier3d::math::Pose::from_parts(to_real(&self.translation), rotation)
     }
 
     /// `self ∘ other`.

@@ -102,6 +102,7 @@ pub(super) fn store(
         body.state.history.x.clear();
         body.state.history.v.clear();
     }
+    body.advance_pins(h);
     body.state.x.clone_from(&problem.current.x);
     let share = problem.pin_share();
     for pin in &mut body.pins {

@@ -1,7 +1,7 @@
 //! Who sleeps and who wakes.
 
 use super::work::IslandWork;
-use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Surroundings, TIME_UNTIL_SLEEP};
+use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Surroundings};
 use crate::contact::{Candidates, Law};
 use crate::coupling::{RapierScene, RapierSets, StepContext};
 use crate::math::{Pose64, Vec3};
@@ -92,6 +92,13 @@ impl Sleeping {
         context: &StepContext<'_>,
     ) {
         let around = LookAround { scene, candidates, context };
+        for (_, body) in
+            deformables.iter_mut().filter(|(_, body)| body.is_enabled() && body.is_asked_to_sleep())
+        {
+            self.look_around(body, &around);
+            (self.now.mate, self.now.rigid) = (None, Vec::new());
+            body.fall_asleep(self.now.clone());
+        }
         self.wake_attached(deformables, context.sets);
         for (_, body) in deformables.iter_mut().filter(|(_, body)| body.is_enabled() && body.is_sleeping()) {
             self.look_around(body, &around);
@@ -123,9 +130,7 @@ impl Sleeping {
         around: &LookAround<'_>,
     ) {
         let LookAround { scene, context, .. } = around;
-        let rested = |h: &DeformableBodyHandle| {
-            deformables.get(*h).is_some_and(|b| b.state.sleep.still_for >= TIME_UNTIL_SLEEP)
-        };
+        let rested = |h: &DeformableBodyHandle| deformables.get(*h).is_some_and(DeformableBody::has_rested);
         if !handles.iter().all(rested) {
             return;
         }

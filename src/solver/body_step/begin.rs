@@ -143,6 +143,7 @@ impl BodyProblem {
         let fall = |i: usize| g + body.forces.get(i).map_or(Vec3::zeros(), |f| f / self.masses[i]);
         self.fall.clear();
         self.fall.extend((0..self.masses.len()).map(fall));
+        body.add_wind(self.dt, &mut self.fall);
         let h = self.h;
         let to_target = |i: usize| self.x_start[i] + self.v_start[i] * h + self.fall[i] * (h * h);
         self.target.clear();
@@ -152,7 +153,7 @@ impl BodyProblem {
         }
         self.pinned_inertia.clear();
         self.pinned_inertia.extend(self.key.pins.iter().map(|&p| self.target[p as usize]));
-        let pins = body.pins.iter().map(|pin| (pin.node, pin.target));
+        let pins = body.pin_targets(self.dt);
         for (node, target) in pins.chain(self.prescribed.iter().map(|p| (p.node, p.target))) {
             self.target[node as usize] = target;
         }
