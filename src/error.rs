@@ -25,6 +25,12 @@ pub enum BodyError {
         /// Vertices of the body, or of the other list.
         expected: usize,
     },
+    /// A state that no body can be in.
+    #[error("the state is damaged: {what}")]
+    BadState {
+        /// What is wrong.
+        what: &'static str,
+    },
     /// The vertex is inside of the body.
     #[error("vertex {vertex} is not on the surface")]
     NotOnSurface {

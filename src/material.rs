@@ -29,6 +29,7 @@ pub struct MaterialError {
 /// assert!(DeformableMaterial::new(5.0e4, 0.5).validate().is_err());
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct DeformableMaterial {
     /// Young's modulus \[Pa\].

@@ -20,6 +20,7 @@ pub enum AttachTo {
 
 /// Vertices of a body attached to something. Hard, unless given a compliance.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct DeformableAttachment {
     pub(crate) body: DeformableBodyHandle,
     /// Nodes of the body.
@@ -38,6 +39,7 @@ pub struct DeformableAttachment {
 
 /// Where the nodes are attached.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum Anchors {
     World(Vec<Vec3>),
     /// In the body's frame.
@@ -176,6 +178,17 @@ impl DeformableAttachment {
             Anchors::Rigid(handle, _) => Some(handle),
             Anchors::World(_) | Anchors::Deformable(..) => None,
         }
+    }
+
+    /// Whether all numbers are such as its user can set.
+    #[cfg(feature = "serde-serialize")]
+    pub(super) fn has_finite_numbers(&self) -> bool {
+        let points = match &self.anchors {
+            Anchors::World(points) | Anchors::Rigid(_, points) => &points[..],
+            Anchors::Deformable(..) => &[],
+        };
+        let are_points = points.iter().chain([&self.force]).all(|p| p.iter().all(|c| c.is_finite()));
+        are_points && self.compliance >= 0.0 && self.length >= 0.0
     }
 
     /// Breaks under the force of a step, if that is too large.

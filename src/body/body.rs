@@ -20,6 +20,7 @@ use std::sync::Arc;
 
 /// A vertex held in place, or led along by its user.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Pin {
     pub(crate) node: u32,
     pub(crate) target: Vec3,
@@ -42,6 +43,7 @@ impl Pin {
 
 /// How the last step of a body went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct StepReport {
     pub iterations: usize,
     pub residual: f64,
@@ -141,11 +143,12 @@ impl DeformableBody {
     /// Goes back to a saved state of this body.
     ///
     /// # Errors
-    /// [`BodyError::WrongSize`] when the state belongs to a mesh of another size.
+    /// [`BodyError::WrongSize`] when the state belongs to a mesh of another size, [`BodyError::BadState`] when it was damaged.
     pub fn restore(&mut self, state: DeformableState) -> Result<(), BodyError> {
         if state.x.len() != self.state.x.len() {
             return Err(BodyError::WrongSize { vertices: state.x.len(), expected: self.state.x.len() });
         }
+        state.check(self.state.x.len()).map_err(|what| BodyError::BadState { what })?;
         self.state = state;
         // Contacts of another mesh of the same size would name nodes that are not on this surface.
         let surface = &self.model.surface.index_of_node;

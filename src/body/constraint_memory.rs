@@ -5,6 +5,7 @@ use crate::math::Vec3;
 /// Names a constraint over several steps. The order of the variants and of their fields is the order in which
 /// constraints are sorted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum ConstraintKey {
     /// A contact of a deformable body with a collider.
     Obstacle(ObstacleContact),
@@ -22,6 +23,7 @@ pub(crate) enum ConstraintKey {
 
 /// A contact of a deformable body with a collider.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct ObstacleContact {
     /// The collider's handle, packed.
     pub collider: u64,
@@ -35,6 +37,7 @@ pub(crate) struct ObstacleContact {
 
 /// Where on a body's surface, or at which corner of the obstacle, a contact is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum Feature {
     Node(u32),
     Edge(u32),
@@ -45,6 +48,7 @@ pub(crate) enum Feature {
 
 /// A contact between deformable bodies; features are nodes, edges or triangles as the kind says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct SoftPairContact {
     /// The second body's handle, packed.
     pub other: u64,
@@ -55,6 +59,7 @@ pub(crate) struct SoftPairContact {
 
 /// What of two deformable bodies touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum SoftPairKind {
     /// A node of the first body, `first`, on a triangle of the second, `second`.
     FirstNode,
@@ -68,6 +73,7 @@ pub(crate) enum SoftPairKind {
 
 /// A point of contact between two rigid bodies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct RigidPairContact {
     /// The colliders' handles, packed.
     pub colliders: [u64; 2],
@@ -79,6 +85,7 @@ pub(crate) struct RigidPairContact {
 
 /// An axis of a joint and what is done to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct JointAxis {
     /// The handle of the joint, or of the multibody link that it leads to, packed.
     pub joint: u64,
@@ -89,6 +96,7 @@ pub(crate) struct JointAxis {
 
 /// What a constraint of a joint is there for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum JointRole {
     /// Holds a locked axis.
@@ -103,6 +111,7 @@ pub enum JointRole {
 
 /// A direction in which an attachment acts on one of its vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct AttachmentAxis {
     pub attachment: u64,
     /// Place in the attachment's list of vertices.
@@ -112,6 +121,7 @@ pub(crate) struct AttachmentAxis {
 
 /// Directions of an attachment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum AttachmentDirection {
     /// Along an axis of the world.
     Axis(u32),
@@ -138,6 +148,7 @@ impl ConstraintKey {
 
 /// What one contact leaves to the next step.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct ConstraintMemory {
     pub key: ConstraintKey,
     /// Force on endpoint 0 \[N\], in the world.
@@ -151,6 +162,7 @@ pub(crate) struct ConstraintMemory {
 /// nearly what it was, the next step takes it as it was: at rest, where rapier's poses differ in their last
 /// digits from step to step, the matrix then stays the same to the last bit and need not be made again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct ConstraintGeometry {
     /// Of soft sides: nodes and their weights.
     pub nodes: [[u32; 3]; 2],
@@ -159,6 +171,14 @@ pub(crate) struct ConstraintGeometry {
     pub frame: [Vec3; 3],
     /// Of rigid sides: from the centre of mass to the point \[m\].
     pub arms: [Vec3; 2],
+}
+
+impl ConstraintMemory {
+    /// All of its numbers, in threes.
+    pub(super) fn numbers(&self) -> [Vec3; 9] {
+        let ConstraintGeometry { weights: [a, b], frame: [n, s, t], arms: [c, d], .. } = self.geometry;
+        [self.force, Vec3::repeat(self.shift_rate), a.into(), b.into(), n, s, t, c, d]
+    }
 }
 
 /// Part of weights, directions and arms by which a geometry may be off. What it leaves of a change of

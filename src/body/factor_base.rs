@@ -14,6 +14,7 @@ const CHANGED_PINS: usize = 16;
 
 /// What the matrix of a body's last steps was made for.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct FactorBase {
     /// The step \[s\] that has its own matrix; zero before the first.
     step: f64,
@@ -65,6 +66,17 @@ impl FactorBase {
         }
         let common = pins.iter().filter(|n| self.pins.binary_search(n).is_ok()).count();
         pins.len() + self.pins.len() - 2 * common <= CHANGED_PINS
+    }
+
+    /// Whether a body of this many nodes can have it.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check(&self, nodes: usize) -> Result<(), &'static str> {
+        let are_steps = [self.step, self.last].iter().all(|h| h.is_finite() && *h >= 0.0);
+        let are_pins =
+            self.pins.is_sorted_by(|a, b| a < b) && self.pins.last().is_none_or(|n| (*n as usize) < nodes);
+        if are_steps && are_pins { Ok(()) } else { Err("its factor is made for pins or steps that are none") }
     }
 
     /// Takes note of a step of `dt` \[s\] with a factor for these pins.

@@ -8,6 +8,7 @@ use std::cmp::Ordering;
 /// Names a body of a [`DeformableBodySet`](super::DeformableBodySet). Generational: a handle of a removed body never names
 /// its successor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct DeformableBodyHandle(pub(super) Index);
 
 impl DeformableBodyHandle {
@@ -29,10 +30,12 @@ impl DeformableBodyHandle {
 
 /// Names an attachment of a [`DeformableBodySet`](super::DeformableBodySet); never used again after its removal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct DeformableAttachmentHandle(pub(crate) u64);
 
 /// What a deformable body touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub enum DeformableContactPartner {
     /// A rapier collider.
     Collider(ColliderHandle),

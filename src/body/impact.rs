@@ -2,6 +2,7 @@
 
 /// What a body hits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum Partner {
     /// A collider, by its handle, packed.
     Collider(u64),
@@ -11,6 +12,7 @@ pub(crate) enum Partner {
 
 /// An impact of a body on its partner, from the first touch until they part.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Impact {
     pub partner: Partner,
     /// Speed of approach at its start [m/s].

@@ -8,6 +8,7 @@ use rapier3d::math::{Pose, Vector};
 
 /// A rigid motion that leads a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Drive {
     /// Of the centre of mass [m/s].
     pub linvel: Vec3,

@@ -9,6 +9,7 @@ mod factor_base;
 mod handle;
 mod impact;
 mod settings;
+mod slots;
 mod state;
 mod touching;
 
@@ -29,6 +30,8 @@ mod builder;
 
 mod attachment;
 mod set;
+#[cfg(feature = "serde-serialize")]
+mod snapshot;
 
 mod attach;
 

@@ -4,10 +4,10 @@ use super::attachment::DeformableAttachment;
 use super::body::DeformableBody;
 use super::builder::DeformableBodyBuilder;
 use super::handle::{DeformableAttachmentHandle, DeformableBodyHandle};
+use super::slots::Slots;
 use super::touching::{Touch, TouchKey};
 use crate::error::DeformableBodyError;
 use crate::math::Vec3;
-use rapier3d::data::arena::Arena;
 use rapier3d::dynamics::RigidBodyHandle;
 use std::collections::BTreeMap;
 use std::ops::{Index as At, IndexMut as AtMut};
@@ -15,11 +15,12 @@ use std::ops::{Index as At, IndexMut as AtMut};
 /// All deformable bodies of a world.
 #[derive(Clone, Debug, Default)]
 pub struct DeformableBodySet {
-    bodies: Arena<DeformableBody>,
-    attachments: BTreeMap<DeformableAttachmentHandle, DeformableAttachment>,
-    attached: u64,
+    pub(super) bodies: Slots<DeformableBody>,
+    pub(super) attachments: BTreeMap<DeformableAttachmentHandle, DeformableAttachment>,
+    /// How many there ever were.
+    pub(super) attached: u64,
     /// Rigid bodies that slept with bodies that were removed, for the next step to wake.
-    released: Vec<RigidBodyHandle>,
+    pub(super) released: Vec<RigidBodyHandle>,
     /// What touches what, where events are wanted of it.
     pub(crate) touching: BTreeMap<TouchKey, Touch>,
 }
@@ -141,7 +142,7 @@ impl DeformableBodySet {
 
     /// Whether a handle names a body of this set.
     pub fn contains(&self, handle: DeformableBodyHandle) -> bool {
-        self.bodies.contains(handle.0)
+        self.bodies.get(handle.0).is_some()
     }
 
     /// Two bodies at once, to be changed; `None` for the second if both are the same.
@@ -150,9 +151,6 @@ impl DeformableBodySet {
         first: DeformableBodyHandle,
         second: DeformableBodyHandle,
     ) -> (Option<&mut DeformableBody>, Option<&mut DeformableBody>) {
-        if first == second {
-            return (self.get_mut(first), None);
-        }
         self.bodies.get2_mut(first.0, second.0)
     }
 
@@ -163,7 +161,7 @@ impl DeformableBodySet {
 
     /// Whether there are no bodies.
     pub fn is_empty(&self) -> bool {
-        self.bodies.is_empty()
+        self.bodies.len() == 0
     }
 }
 
@@ -172,12 +170,12 @@ impl At<DeformableBodyHandle> for DeformableBodySet {
     /// # Panics
     /// If there is no such body; [`DeformableBodySet::get`] does not.
     fn index(&self, handle: DeformableBodyHandle) -> &DeformableBody {
-        &self.bodies[handle.0]
+        self.get(handle).unwrap_or_else(|| panic!("{}", handle.no_such_body()))
     }
 }
 
 impl AtMut<DeformableBodyHandle> for DeformableBodySet {
     fn index_mut(&mut self, handle: DeformableBodyHandle) -> &mut DeformableBody {
-        &mut self.bodies[handle.0]
+        self.get_mut(handle).unwrap_or_else(|| panic!("{}", handle.no_such_body()))
     }
 }

@@ -5,6 +5,7 @@ use crate::fem::{Build, SystemMatrix};
 /// How the matrix of a body's step is answered. All have the same energy, guard, contact and coupling, and
 /// iterated they all come to the same motion; they differ in what an iteration costs and gains.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Solver {
     /// Projective Dynamics [Bouaziz et al. 2014; Liu et al. 2017], the default: the constant
@@ -27,6 +28,7 @@ pub enum Solver {
 
 /// In which rotating frames the rest stiffness is applied.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Frames {
     /// One frame for the body while no element has turned by more than 20° against it, else one
@@ -41,6 +43,7 @@ pub enum Frames {
 
 /// How a step goes forward in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Integrator {
     /// Implicit Euler, of first order: damps motion faster than some tens of steps per period, and is never
@@ -60,6 +63,7 @@ pub enum Integrator {
 /// rounded to single precision is half the memory to read, and solves for a matrix that differs from
 /// the true one by 6e-8 of its norm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum FactorPrecision {
     /// Single where it pays and nothing can be seen of it: for pinned bodies whose matrix has an
@@ -75,6 +79,7 @@ pub enum FactorPrecision {
 
 /// Acceleration of the global iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Acceleration {
     /// The plain iteration.
@@ -123,6 +128,7 @@ impl Default for Acceleration {
 /// # Ok::<(), DeformableBodyError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Fidelity {
     /// One iteration of the [`SystemMatrix::Laplacian`], with eight clusters: the smallest factors, the fewest
@@ -208,6 +214,7 @@ impl Fidelity {
 /// # Ok::<(), DeformableBodyError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct SolverSettings {
     /// What an iteration does.

@@ -10,6 +10,7 @@ use rapier3d::dynamics::RigidBodyHandle;
 /// What the motion of a body changes: what a snapshot has to hold beside the user's own settings (pins,
 /// forces, material). A body restored from it goes on with the same bits.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct DeformableState {
     /// Node positions \[m\].
     pub(crate) x: Vec<Vec3>,
@@ -32,6 +33,7 @@ pub struct DeformableState {
 
 /// The state before the last step; empty where no step can go on from it.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct History {
     /// Length of the step \[s\].
     pub h: f64,
@@ -71,6 +73,7 @@ impl History {
 
 /// How a body sleeps, or how far it is from that.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Sleep {
     /// Time \[s\] for which the body has been still.
     pub still_for: f64,
@@ -84,6 +87,7 @@ pub(crate) struct Sleep {
 
 /// What was around a body when it fell asleep: whatever differs wakes it.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Surroundings {
     /// Key, part, and pose of the obstacles near it.
     pub obstacles: Vec<(u64, u32, Pose64)>,
@@ -113,6 +117,42 @@ impl DeformableState {
     /// Whether a step can go on from it.
     pub(crate) fn is_finite(&self) -> bool {
         self.x.iter().chain(&self.v).all(is_number)
+    }
+
+    /// What of it a body of this many nodes cannot have; positions and velocities may be anything.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub(super) fn check(&self, nodes: usize) -> Result<(), &'static str> {
+        if self.x.len() != nodes || self.v.len() != nodes {
+            return Err("its positions or velocities are not those of its mesh");
+        }
+        let lists = [&self.history.x, &self.history.v, &self.history.acceleration, &self.history.steady];
+        let is_list =
+            |list: &&Vec<Vec3>| list.is_empty() || list.len() == nodes && list.iter().all(is_number);
+        if !(lists.iter().all(is_list)
+            && self.history.x.len() == self.history.v.len()
+            && self.history.h.is_finite())
+        {
+            return Err("the step before its last is not one of its mesh");
+        }
+        let memories = || [&self.contacts, &self.shared].into_iter();
+        if !memories().all(|list| list.is_sorted_by(|a, b| a.key < b.key)) {
+            return Err("its contacts are not in order");
+        }
+        let is_memory = |memory: &ConstraintMemory| {
+            let (of, numbers) = (&memory.geometry.nodes[0], memory.numbers());
+            let is_own = matches!(memory.key, ConstraintKey::Obstacle(_));
+            numbers.iter().all(is_number) && !(is_own && of.iter().any(|n| *n as usize >= nodes))
+        };
+        if !memories().flatten().all(is_memory) {
+            return Err("a contact is not one of its mesh");
+        }
+        let numbers = |i: &Impact| [i.approach, i.stored, i.most_stored, i.left];
+        if !self.impacts.iter().flat_map(numbers).all(f64::is_finite) {
+            return Err("an impact is not finite");
+        }
+        self.factor_base.check(nodes)
     }
 
     /// The contact of the last step with this key.

@@ -4,6 +4,7 @@ use super::handle::{DeformableBodyHandle, DeformableContactPartner};
 
 /// Two things that touch. Of two deformable bodies the older handle comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct TouchKey {
     pub body: DeformableBodyHandle,
     pub partner: DeformableContactPartner,
@@ -13,6 +14,7 @@ pub(crate) struct TouchKey {
 
 /// What has been told of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Touch {
     /// That they touch.
     pub is_told: bool,

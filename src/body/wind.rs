@@ -10,6 +10,7 @@ use rapier3d::math::Vector;
 /// the wind, of sheets all; segments of rods as cylinders, by their length times their diameter. In a step no vertex gains
 /// more than the air has against it: at 1/60 s a cloth of 0.1 kg/m² that is held in 9 m/s and more is pushed by less.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct DeformableWind {
     /// Velocity of the air [m/s].
     pub velocity: Vector,

@@ -23,6 +23,7 @@ macro_rules! energies {
 
         /// The elastic energy of a body's tetrahedra, as a function of the deformation gradient `F`.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
         #[non_exhaustive]
         pub enum Elasticity {
             $($(#[$doc])* $name,)*

@@ -12,6 +12,7 @@ use crate::math::{Mat3, Vec3, vectorized};
 
 /// The constant matrix of the global step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum SystemMatrix {
     /// `M/h² + K₀` with the linear stiffness K₀ of the rest shape, 3n×3n, applied in rotating

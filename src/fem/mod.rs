@@ -7,6 +7,8 @@ mod smoothing;
 mod thin_structure;
 
 mod model;
+#[cfg(feature = "serde-serialize")]
+mod model_file;
 
 mod gradients;
 

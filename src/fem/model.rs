@@ -7,6 +7,7 @@ use crate::material::DeformableMaterial;
 use crate::math::Vec3;
 use crate::math::lanes::LANES;
 use crate::mesh::{MeshError, Structure, Surface, TetMesh, node_adjacency, sweep_order};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Everything about a body that its motion and its material do not change. Made once per mesh and
@@ -47,6 +48,10 @@ pub struct DeformableModel {
     pub(crate) volume: f64,
     node_of_vertex: Vec<u32>,
     vertex_of_node: Vec<u32>,
+    /// What it was made of.
+    pub(super) structure: Arc<Structure>,
+    /// Tetrahedra with muscle fibres, and their unit directions.
+    pub(super) fibres: Vec<(u32, Vec3)>,
 }
 
 /// What the elastic energy of a body is made of.
@@ -81,7 +86,7 @@ impl DeformableModel {
     /// Prepares a mesh for simulation.
     #[must_use]
     pub fn new(mesh: &TetMesh) -> Self {
-        Self::of(&Structure::solid(mesh))
+        Self::of(Structure::solid(mesh))
     }
 
     /// Prepares a structure for simulation: tetrahedra, sheets, rods and springs in any mix.
@@ -90,7 +95,7 @@ impl DeformableModel {
     /// [`MeshError::UnusedVertex`] for a vertex without mass, [`MeshError::Empty`].
     pub fn from_structure(structure: &Structure) -> Result<Self, MeshError> {
         structure.check()?;
-        Ok(Self::of(structure))
+        Ok(Self::of(structure.clone()))
     }
 
     /// The same with muscle fibres in its tetrahedra: `direction` tells their direction at a point of the rest
@@ -99,16 +104,25 @@ impl DeformableModel {
     #[must_use]
     pub fn with_fibres(mut self, direction: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
         self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
-        for tet in &self.tetrahedra {
+        let fibre = |(place, tet): (u32, &[u32; 4])| {
             let middle = tet.iter().map(|&n| self.rest[n as usize]).sum::<Vec3>() / 4.0;
-            let along = Vec3::from(direction(middle.into()));
-            if let Some(along) = along.try_normalize(0.0).filter(|a| a.iter().all(|c| c.is_finite())) {
-                let block = ElementBlock::new(&[*tet], &self.rest);
-                let volume = crate::mesh::signed_volume(&tet.map(|n| self.rest[n as usize]));
-                self.stencils.push(Stencil::fibre(*tet, &block.shape_gradients(0), volume, &along));
-            }
-        }
+            let along = Vec3::from(direction(middle.into())).try_normalize(0.0);
+            along.filter(|along| along.iter().all(|c| c.is_finite())).map(|along| (place, along))
+        };
+        let fibres: Vec<(u32, Vec3)> = (0..).zip(&self.tetrahedra).filter_map(fibre).collect();
+        self.add_fibres(&fibres);
         self
+    }
+
+    /// Adds muscle fibres to tetrahedra, by unit directions.
+    pub(super) fn add_fibres(&mut self, fibres: &[(u32, Vec3)]) {
+        for (place, along) in fibres {
+            let tet = self.tetrahedra[*place as usize];
+            let block = ElementBlock::new(&[tet], &self.rest);
+            let volume = crate::mesh::signed_volume(&tet.map(|n| self.rest[n as usize]));
+            self.stencils.push(Stencil::fibre(tet, &block.shape_gradients(0), volume, along));
+        }
+        self.fibres.extend_from_slice(fibres);
     }
 
     /// The same with its tetrahedra smoothed over their edges and nodes [Liu et al. 2009; He et al. 2013]: they do not
@@ -135,7 +149,8 @@ impl DeformableModel {
     }
 
     /// Of a structure in which every vertex has mass.
-    fn of(structure: &Structure) -> Self {
+    pub(super) fn of(structure: Structure) -> Self {
+        let structure = Arc::new(structure);
         let at_rest: Vec<Vec3> = structure.vertices.iter().map(|&v| v.into()).collect();
         let vertex_of_node = sweep_order(&at_rest);
         let mut node_of_vertex = vec![0; at_rest.len()];
@@ -154,7 +169,7 @@ impl DeformableModel {
             tet.iter().for_each(|&n| node_volumes[n as usize] += own / 4.0);
             volume += own;
         }
-        let thin = ThinElements::new(structure, node, &tetrahedra, &rest, &mut node_volumes);
+        let thin = ThinElements::new(&structure, node, &tetrahedra, &rest, &mut node_volumes);
         volume += thin.volume;
         let sheets: Vec<[u32; 3]> = thin.triangles.iter().map(|t| t.nodes).collect();
         let surface = Surface::new(&tetrahedra, &sheets, &thin.segments, &rest);
@@ -183,6 +198,8 @@ impl DeformableModel {
             surface,
             node_of_vertex,
             vertex_of_node,
+            structure,
+            fibres: Vec::new(),
         }
     }
 
@@ -275,6 +292,8 @@ impl DeformableModel {
             + size_of_val(&self.surface.triangles[..]) * 2
             + size_of_val(&self.surface.edges[..])
             + 12 * self.rest.len()
+            + size_of_val(self.structure.vertices())
+            + size_of_val(self.structure.tetrahedra())
     }
 
     /// The node of a vertex, if there is such a vertex.

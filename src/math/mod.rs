@@ -89,6 +89,7 @@ pub(crate) fn tangents(n: &Vec3) -> [Vec3; 2] {
 
 /// A rigid motion `x ↦ R x + t` in `f64`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Pose64 {
     pub rotation: Mat3,
     pub translation: Vec3,

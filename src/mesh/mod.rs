@@ -8,6 +8,7 @@ mod lattice;
 mod mesh_error;
 mod ordering;
 mod structure;
+mod structure_check;
 mod surface;
 mod tet_mesh;
 

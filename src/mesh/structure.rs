@@ -1,13 +1,8 @@
 //! What a body can be made of besides tetrahedra: sheets, rods and springs over shared vertices.
 
 use super::mesh_error::MeshError;
-use super::tet_mesh::{TetMesh, check_extent, check_finite};
-use crate::math::Vec3;
-
-/// Lengths over that of the whole below which an edge counts as none.
-const SHORT: f64 = 1.0e-9;
-/// Area over squared longest edge below which a triangle counts as flat.
-const THIN: f64 = 1.0e-6;
+use super::structure_check::check_size;
+use super::tet_mesh::{TetMesh, check_finite};
 
 /// Tetrahedra, sheets, rods and springs over shared vertices, in any mix: a body of several materials' shapes.
 /// Cross-sections make stiffness and mass of what is thin follow from the same pascals and kilograms per
@@ -25,6 +20,8 @@ const THIN: f64 = 1.0e-6;
 /// # Ok::<(), foible3d::MeshError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde-serialize", serde(try_from = "super::structure_check::Unchecked"))]
 pub struct Structure {
     pub(crate) vertices: Vec<[f64; 3]>,
     pub(crate) tetrahedra: Vec<[u32; 4]>,
@@ -36,18 +33,21 @@ pub struct Structure {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct SheetTriangle {
     pub corners: [u32; 3],
     pub thickness: f64,
 }
 
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Rod {
     pub points: Vec<u32>,
     pub radius: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Spring {
     pub ends: [u32; 2],
     /// Cross-section \[m²\].
@@ -142,37 +142,12 @@ impl Structure {
     /// As [`Structure::sheet`].
     pub fn with_sheet(mut self, triangles: &[[u32; 3]], thickness: f64) -> Result<Self, MeshError> {
         check_size("thickness", thickness)?;
-        for (k, corners) in triangles.iter().enumerate() {
-            let triangle = self.sheets.len() + k;
-            for (c, &vertex) in corners.iter().enumerate() {
-                let vertices = self.vertices.len();
-                if vertex as usize >= vertices {
-                    return Err(MeshError::TriangleOutOfRange { triangle, vertex, vertices });
-                }
-                if corners[..c].contains(&vertex) {
-                    return Err(MeshError::RepeatedInTriangle { triangle, vertex });
-                }
-            }
-            let [a, b, c] = corners.map(|v| Vec3::from(self.vertices[v as usize]));
-            let area = 0.5 * (b - a).cross(&(c - a)).norm();
-            let edge = (b - a).norm().max((c - b).norm()).max((a - c).norm());
-            if area <= THIN * edge * edge {
-                return Err(MeshError::FlatTriangle { triangle, area, edge });
-            }
+        let first = self.sheets.len();
+        for (triangle, corners) in (first..).zip(triangles) {
+            self.check_triangle(triangle, corners)?;
         }
         self.sheets.extend(triangles.iter().map(|&corners| SheetTriangle { corners, thickness }));
-        let all: Vec<[u32; 3]> = self.sheets.iter().map(|t| t.corners).collect();
-        let mut sorted: Vec<([u32; 3], usize)> = all.iter().copied().zip(0..).collect();
-        sorted.iter_mut().for_each(|(t, _)| t.sort_unstable());
-        sorted.sort_unstable();
-        if let Some(pair) = sorted.windows(2).find(|p| p[0].0 == p[1].0) {
-            return Err(MeshError::RepeatedTriangle { triangle: pair[1].1, vertices: pair[1].0 });
-        }
-        for used in super::surface::edge_uses(&all) {
-            if used.count > 2 {
-                return Err(MeshError::NonManifoldEdge { edge: used.edge, count: used.count });
-            }
-        }
+        self.check_sheets()?;
         Ok(self)
     }
 
@@ -181,15 +156,9 @@ impl Structure {
     /// # Errors
     /// As [`Structure::rod`].
     pub fn with_rod(mut self, points: Vec<u32>, radius: f64) -> Result<Self, MeshError> {
-        check_size("radius", radius)?;
-        if points.len() < 2 {
-            return Err(MeshError::Empty);
-        }
-        let size = self.size();
-        for ends in points.windows(2) {
-            self.check_ends([ends[0], ends[1]], size)?;
-        }
-        self.rods.push(Rod { points, radius });
+        let rod = Rod { points, radius };
+        self.check_rod(&rod, self.size())?;
+        self.rods.push(rod);
         Ok(self)
     }
 
@@ -214,9 +183,9 @@ impl Structure {
     /// # Errors
     /// Ends that are no vertices or in one place, a bad area.
     pub fn with_spring(mut self, ends: [u32; 2], area: f64) -> Result<Self, MeshError> {
-        check_size("cross-section", area)?;
-        self.check_ends(ends, self.size())?;
-        self.springs.push(Spring { ends, area });
+        let spring = Spring { ends, area };
+        self.check_spring(&spring, self.size())?;
+        self.springs.push(spring);
         Ok(self)
     }
 
@@ -225,54 +194,16 @@ impl Structure {
         &self.vertices
     }
 
-    /// Whether a body of it has mass everywhere: every vertex belongs to a tetrahedron, a sheet or a rod.
-    ///
-    /// # Errors
-    /// [`MeshError::Empty`], [`MeshError::UnusedVertex`], [`MeshError::Extent`].
-    pub(crate) fn check(&self) -> Result<(), MeshError> {
-        let mut used = vec![false; self.vertices.len()];
-        let corners = self.tetrahedra.iter().flatten();
-        let corners = corners.chain(self.sheets.iter().flat_map(|t| &t.corners));
-        corners.chain(self.rods.iter().flat_map(|r| &r.points)).for_each(|&v| used[v as usize] = true);
-        match used.iter().position(|u| !u) {
-            _ if used.is_empty() => Err(MeshError::Empty),
-            Some(vertex) => Err(MeshError::UnusedVertex { vertex }),
-            None => check_extent(&self.vertices),
-        }
-    }
-
-    /// Extent of the vertices \[m\].
-    fn size(&self) -> f64 {
-        let all = self.vertices.iter().map(|v| Vec3::from(*v));
-        let low = all.clone().fold(Vec3::repeat(f64::INFINITY), |a, b| a.inf(&b));
-        let high = all.fold(Vec3::repeat(f64::NEG_INFINITY), |a, b| a.sup(&b));
-        (high - low).norm()
-    }
-
-    fn check_ends(&self, ends: [u32; 2], size: f64) -> Result<(), MeshError> {
-        let vertices = self.vertices.len();
-        if let Some(&vertex) = ends.iter().find(|&&v| v as usize >= vertices) {
-            return Err(MeshError::EndOutOfRange { ends, vertex, vertices });
-        }
-        let [a, b] = ends.map(|v| Vec3::from(self.vertices[v as usize]));
-        let length = (b - a).norm();
-        match length > SHORT * size {
-            true => Ok(()),
-            false => Err(MeshError::ShortEdge { ends, length }),
-        }
-    }
-}
-
-fn check_size(quantity: &'static str, value: f64) -> Result<(), MeshError> {
-    match value.is_finite() && value > 0.0 {
-        true => Ok(()),
-        false => Err(MeshError::BadSize { quantity, value }),
+    /// Four vertex indices per tetrahedron.
+    pub fn tetrahedra(&self) -> &[[u32; 4]] {
+        &self.tetrahedra
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Vec3;
 
     #[test]
     fn triangles_of_a_rectangle_cover_it_and_face_up() {

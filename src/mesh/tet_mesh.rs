@@ -35,17 +35,12 @@ impl TetMesh {
             return Err(MeshError::Empty);
         }
         check_finite(&vertices)?;
+        let volumes = check_tetrahedra(&vertices, &tetrahedra)?;
         let mut used = vec![false; vertices.len()];
-        let mut volumes = Vec::with_capacity(tetrahedra.len());
-        for (tet, corners) in tetrahedra.iter().enumerate() {
-            check_indices(tet, corners, vertices.len())?;
-            volumes.push(check_volume(tet, corners.map(|c| Vec3::from(vertices[c as usize])))?);
-            corners.iter().for_each(|&c| used[c as usize] = true);
-        }
+        tetrahedra.iter().flatten().for_each(|&c| used[c as usize] = true);
         if let Some(vertex) = used.iter().position(|u| !u) {
             return Err(MeshError::UnusedVertex { vertex });
         }
-        check_surface(&tetrahedra)?;
         check_extent(&vertices)?;
         Ok(Self { vertices, tetrahedra, volumes })
     }
@@ -94,6 +89,20 @@ pub(super) fn check_finite(vertices: &[[f64; 3]]) -> Result<(), MeshError> {
 
 /// Extents \[m\] of what can be simulated: f32 keeps 6e-8 of a place, and squares far beyond overflow it.
 const EXTENTS: [f64; 2] = [1.0e-6, 1.0e6];
+
+/// Checks tetrahedra over finite vertices, and how they go together; returns their volumes \[m³\].
+pub(super) fn check_tetrahedra(
+    vertices: &[[f64; 3]],
+    tetrahedra: &[[u32; 4]],
+) -> Result<Vec<f64>, MeshError> {
+    let mut volumes = Vec::with_capacity(tetrahedra.len());
+    for (tet, corners) in tetrahedra.iter().enumerate() {
+        check_indices(tet, corners, vertices.len())?;
+        volumes.push(check_volume(tet, corners.map(|c| Vec3::from(vertices[c as usize])))?);
+    }
+    check_surface(tetrahedra)?;
+    Ok(volumes)
+}
 
 /// Whether a mesh or structure has the size of something in a world of metres.
 pub(super) fn check_extent(vertices: &[[f64; 3]]) -> Result<(), MeshError> {

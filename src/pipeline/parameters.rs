@@ -15,6 +15,7 @@ use std::time::Duration;
 /// assert_eq!(deformables.parameters.contact_iterations, 120);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct DeformableParameters {
     /// Speed [m/s] at which overlaps found at the start of a step are undone.

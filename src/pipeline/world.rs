@@ -30,13 +30,22 @@ use rapier3d::pipeline::PhysicsWorld;
 /// # Ok::<(), DeformableBodyError>(())
 /// ```
 #[derive(Debug, Default)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct DeformableWorld {
     /// The bodies.
     pub bodies: DeformableBodySet,
     /// World-wide parameters.
     pub parameters: DeformableParameters,
     /// Memory and caches of the step.
+    #[cfg_attr(feature = "serde-serialize", serde(skip))]
     pub pipeline: DeformablePipeline,
+}
+
+/// Of what the world holds; the copy makes its caches anew.
+impl Clone for DeformableWorld {
+    fn clone(&self) -> Self {
+        Self { bodies: self.bodies.clone(), parameters: self.parameters, pipeline: DeformablePipeline::new() }
+    }
 }
 
 impl DeformableWorld {
