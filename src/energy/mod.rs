@@ -94,6 +94,13 @@ pub(crate) struct Lame {
     pub lambda: f64,
 }
 
+impl Lame {
+    /// What resists a change of shape, and what resists one of volume.
+    pub fn split(self) -> [Self; 2] {
+        [Self { lambda: 0.0, ..self }, Self { mu: 0.0, ..self }]
+    }
+}
+
 /// What an element answers to its deformation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Response {

@@ -2,8 +2,9 @@
 //! is put together, and as what it does to a vector, for the one that is not. Sheets, rods and springs
 //! are in it as a multiple of I that is about as stiff as they are along their lengths, without their strain limits.
 
-use super::gradients::{scatter_solid, solid_blocks, solid_gradient};
+use super::gradients::{deformation_gradient, scatter_forces};
 use super::model::{DeformableModel, Elements};
+use super::smoothing::SmoothingDomains;
 use super::thin_elements::{length_energy, membrane};
 use crate::energy::{ElementEnergy, Lame, with_energy};
 use crate::material::DeformableMaterial;
@@ -31,24 +32,33 @@ pub(crate) fn laplacian_weight(material: &DeformableMaterial) -> f64 {
     with_energy!(material, energy => energy.laplacian_weight())
 }
 
+/// Of elements with these of Lamé's constants. Strain limits go with the shape.
+fn weight_of(material: &DeformableMaterial, lame: Lame) -> f64 {
+    let bare = DeformableMaterial { strain_limits: None, ..*material };
+    let material = if lame.mu > 0.0 { material } else { &bare };
+    with_energy!(material, lame, energy => energy.laplacian_weight())
+}
+
 /// Calls `add(i, j, K)` with the blocks of every element [N/m].
 pub(crate) fn add_blocks(
     elements: &Elements<'_>,
     system: SystemMatrix,
     mut add: impl FnMut(usize, usize, &Mat3),
 ) {
-    let Lame { mu, lambda } = elements.material.lame();
-    let weight = laplacian_weight(elements.material);
-    let block = |a: &Vec3, b: &Vec3| match system {
-        SystemMatrix::Laplacian => Mat3::from_diagonal_element(weight * a.dot(b)),
-        SystemMatrix::RestStiffness => {
-            (Mat3::from_diagonal_element(a.dot(b)) + b * a.transpose()) * mu + a * b.transpose() * lambda
-        }
-    };
-    elements.model.for_each_solid(|nodes, gradients, volume| {
+    let material = elements.material;
+    elements.model.for_each_energy(material.lame(), |lame, nodes, gradients, volume| {
+        let Lame { mu, lambda } = lame;
+        let weight = weight_of(material, lame);
         for (&i, a) in nodes.iter().zip(gradients) {
             for (&j, b) in nodes.iter().zip(gradients) {
-                add(i as usize, j as usize, &(block(a, b) * volume));
+                let block = match system {
+                    SystemMatrix::Laplacian => Mat3::from_diagonal_element(weight * a.dot(b)),
+                    SystemMatrix::RestStiffness => {
+                        let shape = (Mat3::from_diagonal_element(a.dot(b)) + b * a.transpose()) * mu;
+                        shape + a * b.transpose() * lambda
+                    }
+                };
+                add(i as usize, j as usize, &(block * volume));
             }
         }
     });
@@ -77,37 +87,62 @@ fn add_thin_bounds(elements: &Elements<'_>, mut add: impl FnMut(usize, usize, f6
 
 /// Subtracts the elastic part of the matrix times `v` from `out`.
 pub(crate) fn subtract_product(elements: &Elements<'_>, system: SystemMatrix, v: &[Vec3], out: &mut [Vec3]) {
-    let weight = laplacian_weight(elements.material);
-    let laplacian = (system == SystemMatrix::Laplacian).then_some(weight);
-    subtract_solid_product(elements.model, elements.material.lame(), laplacian, v, out);
+    let Elements { model, material, .. } = elements;
+    let law = |lame: Lame| match system {
+        SystemMatrix::Laplacian => Law::Laplacian(weight_of(material, lame)),
+        SystemMatrix::RestStiffness => Law::Lame(lame),
+    };
+    if model.is_smoothed() {
+        let [shape, volume] = material.lame().split();
+        subtract_domains(&model.domains, law(shape), v, out);
+        if volume.lambda > 0.0 {
+            subtract_domains(&model.volume_domains, law(volume), v, out);
+        }
+    } else {
+        subtract_tetrahedra(model, law(material.lame()), v, out);
+    }
     add_thin_bounds(elements, |i, j, k| out[i] -= v[j] * k);
 }
 
-vectorized! {
-fn subtract_solid_product[](
-    model: &DeformableModel,
-    lame: Lame,
-    laplacian: Option<f64>,
-    v: &[Vec3],
-    out: &mut [Vec3],
-) {
-    for block in 0..solid_blocks(model) {
-        let G = solid_gradient(model, block, v);
-        let stress = match laplacian {
-            Some(weight) => G.scaled(Lane::splat(weight)),
-            None => {
-                let pressure = (G.at(0, 0) + G.at(1, 1) + G.at(2, 2)) * lame.lambda;
-                let mut stress = LaneMat3::default();
-                for c in 0..3 {
-                    for r in 0..3 {
-                        stress.0[3 * c + r] = (G.at(r, c) + G.at(c, r)) * lame.mu;
-                    }
-                    stress.0[4 * c] += pressure;
-                }
-                stress
-            }
+/// Stress of a gradient.
+#[derive(Clone, Copy)]
+enum Law {
+    Laplacian(f64),
+    Lame(Lame),
+}
+
+impl Law {
+    #[inline(always)]
+    fn stress(self, G: &LaneMat3) -> LaneMat3 {
+        let lame = match self {
+            Self::Laplacian(weight) => return G.scaled(Lane::splat(weight)),
+            Self::Lame(lame) => lame,
         };
-        scatter_solid(model, block, &stress, out);
+        let pressure = (G.at(0, 0) + G.at(1, 1) + G.at(2, 2)) * lame.lambda;
+        let mut stress = LaneMat3::default();
+        for c in 0..3 {
+            for r in 0..3 {
+                stress.0[3 * c + r] = (G.at(r, c) + G.at(c, r)) * lame.mu;
+            }
+            stress.0[4 * c] += pressure;
+        }
+        stress
+    }
+}
+
+vectorized! {
+fn subtract_tetrahedra[](model: &DeformableModel, law: Law, v: &[Vec3], out: &mut [Vec3]) {
+    for block in &model.blocks {
+        scatter_forces(block, &law.stress(&deformation_gradient(block, v)), out);
+    }
+}
+}
+
+vectorized! {
+fn subtract_domains[](domains: &SmoothingDomains, law: Law, v: &[Vec3], out: &mut [Vec3]) {
+    for block in 0..domains.block_count() {
+        let G = domains.deformation_gradient(block, v);
+        domains.scatter_forces(block, &law.stress(&G), out);
     }
 }
 }

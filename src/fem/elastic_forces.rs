@@ -25,6 +25,8 @@ pub(crate) struct StiffnessDamping {
     ratio: f64,
     /// Stretch of each block at the start of the step; empty without damping.
     stretches: Vec<LaneMat3>,
+    /// Those of the patches of smoothed bodies.
+    patches: Vec<LaneMat3>,
     thin: ThinDamping,
 }
 
@@ -33,13 +35,17 @@ impl StiffnessDamping {
     /// \[s\], `h` \[s\].
     pub fn begin(&mut self, model: &DeformableModel, beta: f64, h: f64, x: &[Vec3], before: Option<&[Vec3]>) {
         self.ratio = beta / h;
-        self.stretches.clear();
-        if beta > 0.0 {
-            push_stretches(model, x, &mut self.stretches);
-            if let Some(before) = before {
-                let mut last = Vec::new();
-                push_stretches(model, before, &mut last);
-                for (now, last) in self.stretches.iter_mut().zip(&last) {
+        let mut last = Vec::new();
+        for (stretches, push) in [
+            (&mut self.stretches, push_stretches as fn(&DeformableModel, &[Vec3], &mut Vec<LaneMat3>)),
+            (&mut self.patches, push_patch_stretches),
+        ] {
+            stretches.clear();
+            if beta > 0.0 {
+                push(model, x, stretches);
+                last.clear();
+                before.iter().for_each(|before| push(model, before, &mut last));
+                for (now, last) in stretches.iter_mut().zip(&last) {
                     *now = now.plus_scaled(&now.minus(last), Lane::splat(1.0 / 3.0));
                 }
             }
@@ -51,12 +57,24 @@ impl StiffnessDamping {
 vectorized! {
 fn push_stretches[](model: &DeformableModel, x: &[Vec3], stretches: &mut Vec<LaneMat3>) {
     for block in 0..solid_blocks(model) {
-        let F = solid_gradient(model, block, x);
-        let S = transpose_mul(&polar_rotations(&F), &F);
-        // Symmetric but for roundings.
-        stretches.push(LaneMat3(std::array::from_fn(|k| (S.0[k] + S.at(k / 3, k % 3)) * 0.5)));
+        stretches.push(stretch(&solid_gradient(model, block, x)));
     }
 }
+}
+
+vectorized! {
+fn push_patch_stretches[](model: &DeformableModel, x: &[Vec3], stretches: &mut Vec<LaneMat3>) {
+    for block in 0..model.volume_domains.block_count() {
+        stretches.push(stretch(&model.volume_domains.deformation_gradient(block, x)));
+    }
+}
+}
+
+#[inline(always)]
+fn stretch(F: &LaneMat3) -> LaneMat3 {
+    let S = transpose_mul(&polar_rotations(F), F);
+    // Symmetric but for roundings.
+    LaneMat3(std::array::from_fn(|k| (S.0[k] + S.at(k / 3, k % 3)) * 0.5))
 }
 
 /// Blocks that go through the stages of the element loop together.
@@ -147,26 +165,25 @@ fn sum_elements[E: ElementEnergy](
 }
 }
 
-/// Shape over edges, volume over nodes: every energy is the sum of what μ and what λ weigh.
+/// Shape over edges, volume over patches: every energy, and damping, is the sum of what μ and what λ weigh.
 fn add_smoothed_forces(
     model: &DeformableModel,
     material: &DeformableMaterial,
     at: &Evaluation<'_>,
     force: &mut [Vec3],
 ) -> Elastic {
-    let lame @ Lame { mu, lambda } = material.lame();
-    let mut elastic = with_energy!(material, Lame { mu, lambda: 0.0 }, energy => {
-        sum_domains(energy, &model.domains, lame, at, force)
+    let [shape, volume] = material.lame().split();
+    let mut elastic = with_energy!(material, shape, energy => {
+        sum_domains(energy, &model.domains, (shape, &at.damping.stretches), at, force)
     });
-    if lambda > 0.0 && elastic.energy < f64::INFINITY {
+    if volume.lambda > 0.0 && elastic.energy < f64::INFINITY {
         let bare = DeformableMaterial { strain_limits: None, ..*material };
-        let undamped = StiffnessDamping::default();
-        let rest = Evaluation { damping: &undamped, limit: at.limit - elastic.energy, ..*at };
-        let volume = with_energy!(bare, Lame { mu: 0.0, lambda }, energy => {
-            sum_domains(energy, &model.volume_domains, lame, &rest, force)
+        let rest = Evaluation { limit: at.limit - elastic.energy, ..*at };
+        let of_volume = with_energy!(bare, volume, energy => {
+            sum_domains(energy, &model.volume_domains, (volume, &at.damping.patches), &rest, force)
         });
-        elastic.energy += volume.energy;
-        elastic.evaluated += volume.evaluated;
+        elastic.energy += of_volume.energy;
+        elastic.evaluated += of_volume.evaluated;
     }
     elastic
 }
@@ -175,17 +192,18 @@ vectorized! {
 fn sum_domains[E: ElementEnergy](
     energy: E,
     domains: &SmoothingDomains,
-    lame: Lame,
+    damped: (Lame, &[LaneMat3]),
     at: &Evaluation<'_>,
     force: &mut [Vec3],
 ) -> Elastic {
     let Evaluation { damping, x, frame, limit } = *at;
+    let (lame, stretches) = damped;
     let mut total = Lane::default();
     let mut least_trace = Lane::splat(3.0);
     for block in 0..domains.block_count() {
         let F = domains.deformation_gradient(block, x);
         let mut response = energy.evaluate(&F);
-        if let Some(stretch) = damping.stretches.get(block) {
+        if let Some(stretch) = stretches.get(block) {
             let (density, stress) = damping_response(lame, stretch, &F, &response.rotation);
             response.density += density * damping.ratio;
             response.stress = response.stress.plus_scaled(&stress, Lane::splat(damping.ratio));

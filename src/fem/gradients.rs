@@ -20,14 +20,6 @@ pub(super) fn solid_gradient(model: &DeformableModel, block: usize, x: &[Vec3]) 
 }
 
 #[inline(always)]
-pub(super) fn scatter_solid(model: &DeformableModel, block: usize, stress: &LaneMat3, force: &mut [Vec3]) {
-    match model.is_smoothed() {
-        true => model.domains.scatter_forces(block, stress, force),
-        false => scatter_forces(&model.blocks[block], stress, force),
-    }
-}
-
-#[inline(always)]
 pub(super) fn deformation_gradient(block: &ElementBlock, x: &[Vec3]) -> LaneMat3 {
     let mut corners = [[Lane::default(); 3]; 4];
     for a in 0..4 {

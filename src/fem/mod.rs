@@ -3,6 +3,7 @@
 //! Architecture invariant: nothing here knows a body's state beyond the positions it is given.
 
 mod elements;
+mod patches;
 mod smoothing;
 mod thin_structure;
 

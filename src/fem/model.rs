@@ -1,8 +1,10 @@
 //! The constant part of a body: rest mesh, elements, surface, node order.
 
 use super::elements::{ElementBlock, Stencil, TriangleElement};
+use super::patches::patches;
 use super::smoothing::SmoothingDomains;
 use super::thin_structure::ThinElements;
+use crate::energy::Lame;
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
 use crate::math::lanes::LANES;
@@ -22,8 +24,7 @@ pub struct DeformableModel {
     pub(crate) tetrahedra: Vec<[u32; 4]>,
     /// The tetrahedra again, four at a time, as the element loops want them.
     pub(crate) blocks: Vec<ElementBlock>,
-    /// In the place of `blocks`, the domains of smoothed tetrahedra: around edges for the shape, around nodes for
-    /// the volume.
+    /// In the place of `blocks`, the domains of smoothed tetrahedra: around edges for the shape, patches for the volume.
     pub(crate) domains: SmoothingDomains,
     pub(crate) volume_domains: SmoothingDomains,
     /// Triangles of sheets.
@@ -125,10 +126,11 @@ impl DeformableModel {
         self.fibres.extend_from_slice(fibres);
     }
 
-    /// The same with its tetrahedra smoothed over their edges and nodes [Liu et al. 2009; He et al. 2013]: they do not
+    /// The same with its tetrahedra smoothed: over their edges in what resists a change of shape [Liu et al. 2009; He et al.
+    /// 2013], over patches of about five in what resists a change of volume [Souza Neto et al. 2005]. They do not
     /// lock, in bending and near incompressibility, as linear tetrahedra do, whose stiffness falls to the
     /// true one only with the mesh. Elements cost three times as much, and the factor is twice as large:
-    /// worth it wherever the mesh is coarse. What it gains is in `docs/accuracy.md`.
+    /// worth it wherever the mesh is coarse, with two cells across and more. What it gains is in `docs/accuracy.md`.
     #[must_use]
     pub fn smoothed(mut self) -> Self {
         if !self.is_solid() {
@@ -136,11 +138,14 @@ impl DeformableModel {
         }
         self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
         let tetrahedra = self.shaped_tetrahedra();
-        let (around_edges, around_nodes) =
-            (SmoothingDomains::around_edges(tetrahedra.clone()), SmoothingDomains::around_nodes(tetrahedra));
-        (self.domains, self.volume_domains) = (around_edges, around_nodes);
+        let volumes: Vec<f64> = tetrahedra.clone().map(|(_, _, volume)| volume).collect();
+        let patches = patches(&self.tetrahedra[..volumes.len()], &volumes);
+        let around_edges = SmoothingDomains::around_edges(tetrahedra.clone());
+        let of_patches = SmoothingDomains::of_patches(tetrahedra, &patches);
+        (self.domains, self.volume_domains) = (around_edges, of_patches);
         let mut domains: Vec<Vec<u32>> = Vec::new();
         self.domains.for_each(|nodes, _, _| domains.push(nodes.to_vec()));
+        self.volume_domains.for_each(|nodes, _, _| domains.push(nodes.to_vec()));
         let stencils = self.stencils.iter().map(|s| &s.nodes[..]);
         let thin = self.triangles.iter().map(|t| &t.nodes[..]).chain(stencils);
         let solid = self.tetrahedra.iter().map(|t| &t[..]).chain(domains.iter().map(|p| &p[..]));
@@ -228,7 +233,20 @@ impl DeformableModel {
         }
     }
 
-    /// Whether its tetrahedra are smoothed over their edges.
+    /// Calls `with` as [`DeformableModel::for_each_solid`], with what of Lamé's constants the energy of each element has: both, or
+    /// around edges μ and in patches λ.
+    pub(crate) fn for_each_energy(&self, lame: Lame, mut with: impl FnMut(Lame, &[u32], &[Vec3], f64)) {
+        if !self.is_smoothed() {
+            return self.for_each_solid(|nodes, gradients, volume| with(lame, nodes, gradients, volume));
+        }
+        let [shape, volume] = lame.split();
+        self.domains.for_each(|nodes, gradients, own| with(shape, nodes, gradients, own));
+        if lame.lambda > 0.0 {
+            self.volume_domains.for_each(|nodes, gradients, own| with(volume, nodes, gradients, own));
+        }
+    }
+
+    /// Whether its tetrahedra are smoothed.
     pub fn is_smoothed(&self) -> bool {
         self.domains.count > 0
     }
@@ -275,6 +293,16 @@ impl DeformableModel {
     pub fn surface_triangles(&self) -> impl ExactSizeIterator<Item = [u32; 3]> + '_ {
         let vertex = |n: u32| self.vertex_of_node[n as usize];
         self.surface.triangles.iter().map(move |t| t.map(vertex))
+    }
+
+    /// Vertices of the tetrahedra.
+    pub fn tetrahedra(&self) -> impl ExactSizeIterator<Item = [u32; 4]> + '_ {
+        self.tetrahedra.iter().map(|t| t.map(|n| self.vertex_of_node[n as usize]))
+    }
+
+    /// Nodes along each rod.
+    pub(crate) fn rods(&self) -> impl Iterator<Item = Vec<u32>> + '_ {
+        self.structure.rods().map(|points| points.iter().map(|&v| self.node_of_vertex[v as usize]).collect())
     }
 
     /// Bytes of the constant data: mesh, gradients, surface, orders.

@@ -1,6 +1,6 @@
-//! Tetrahedra smoothed over their edges and nodes [Liu et al. 2009; He et al. 2013]: around every edge one
-//! deformation gradient, the mean of those of the tetrahedra that share it, and the energy of shape of that; around
-//! every node likewise, and the energy of volume. Linear tetrahedra by themselves are too stiff, in
+//! Tetrahedra smoothed over their edges and over patches [Liu et al. 2009; He et al. 2013; Souza Neto et al. 2005]: around
+//! every edge one deformation gradient, the mean of those of the tetrahedra that share it, and the energy of shape of that;
+//! of every patch likewise, and the energy of volume. Linear tetrahedra by themselves are too stiff, in
 //! bending and near incompressibility most of all; their means are not.
 //!
 //! A domain is an element like any other, of all nodes of its tetrahedra, with the means of their shape
@@ -46,23 +46,20 @@ impl SmoothingDomains {
         let edges = |n: &[u32; 4]| {
             [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]].map(|[i, j]| [n[i].min(n[j]), n[i].max(n[j])])
         };
-        Self::new(tetrahedra, edges)
+        Self::new(tetrahedra.map(|tet| (edges(&tet.0), tet)))
     }
 
-    /// Around nodes.
-    pub fn around_nodes(tetrahedra: impl Iterator<Item = Tetrahedron>) -> Self {
-        Self::new(tetrahedra, |n| n.map(|n| [n, n]))
+    /// Of the patches that the tetrahedra are in.
+    pub fn of_patches(tetrahedra: impl Iterator<Item = Tetrahedron>, patches: &[u32]) -> Self {
+        Self::new(patches.iter().map(|patch| [[*patch; 2]]).zip(tetrahedra))
     }
 
-    /// Around whatever is named by two nodes; each tetrahedron is shared by N such.
-    fn new<const N: usize>(
-        tetrahedra: impl Iterator<Item = Tetrahedron>,
-        names: impl Fn(&[u32; 4]) -> [[u32; 2]; N],
-    ) -> Self {
+    /// Of whatever is named by two numbers; each tetrahedron is shared by N such.
+    fn new<const N: usize>(tetrahedra: impl Iterator<Item = ([[u32; 2]; N], Tetrahedron)>) -> Self {
         let mut by_name: BTreeMap<[u32; 2], Patch> = BTreeMap::new();
-        for (nodes, gradients, volume) in tetrahedra {
+        for (names, (nodes, gradients, volume)) in tetrahedra {
             let share = volume / N as f64;
-            for name in names(&nodes) {
+            for name in names {
                 let domain = by_name.entry(name).or_default();
                 domain.volume += share;
                 for (&n, g) in nodes.iter().zip(&gradients) {

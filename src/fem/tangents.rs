@@ -4,10 +4,10 @@ use super::model::Elements;
 use super::thin_elements::{length_energy, membrane};
 use crate::energy::membrane::MembraneMode;
 use crate::energy::{ElementEnergy, Mode, modes, with_energy};
+use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3};
 
-/// Calls `add(i, j, K)` with the blocks `K = −∂fᵢ/∂xⱼ` [N/m] of every element at positions `x`; of smoothed
-/// bodies as if the volume were smoothed over edges as the shape is, which couples fewer nodes. With
+/// Calls `add(i, j, K)` with the blocks `K = −∂fᵢ/∂xⱼ` [N/m] of every element at positions `x`. With
 /// `projected` without the modes of negative stiffness: positive semi-definite then.
 pub(crate) fn add_tangents(
     elements: &Elements<'_>,
@@ -18,10 +18,13 @@ pub(crate) fn add_tangents(
     let Elements { model, material, activation } = elements;
     let kept = |stiffness: f64| if projected { stiffness.max(0.0) } else { stiffness };
     let mut sides = Vec::new();
-    model.for_each_solid(|nodes, gradients, volume| {
+    // As in the forces, strain limits go with the shape.
+    let bare = DeformableMaterial { strain_limits: None, ..**material };
+    model.for_each_energy(material.lame(), |lame, nodes, gradients, volume| {
+        let material = if lame.mu > 0.0 { material } else { &bare };
         let F =
             nodes.iter().zip(gradients).fold(Mat3::zeros(), |F, (&n, g)| F + x[n as usize] * g.transpose());
-        let modes: [Mode; 9] = with_energy!(material, energy => modes(&F, |s| energy.principal(s)));
+        let modes: [Mode; 9] = with_energy!(material, lame, energy => modes(&F, |s| energy.principal(s)));
         sides.clear();
         sides.extend(modes.iter().flat_map(|m| gradients.iter().map(|g| m.shape * g)));
         add_products(nodes, &modes.map(|m| kept(m.stiffness) * volume), &sides, &mut add);
@@ -75,7 +78,6 @@ mod tests {
     use super::*;
     use crate::energy::Elasticity;
     use crate::fem::elastic_forces::{Evaluation, StiffnessDamping, add_forces};
-    use crate::material::DeformableMaterial;
     use crate::mesh::{Structure, TetMesh};
     use nalgebra::DMatrix;
     use proptest::prelude::*;
@@ -113,8 +115,7 @@ mod tests {
             shakes in proptest::collection::vec(-0.02..0.02f64, 60), kind in 0usize..4,
         ) {
             for model in models() {
-                let nu = if model.is_smoothed() { 0.0 } else { 0.3 };
-                let material = DeformableMaterial::new(1e3, nu).fibre_modulus(500.0).elasticity(Elasticity::ALL[kind]);
+                let material = DeformableMaterial::new(1e3, 0.3).fibre_modulus(500.0).elasticity(Elasticity::ALL[kind]);
                 let elements = Elements { model: &model, material: &material, activation: 0.8 };
                 let x: Vec<Vec3> = model.rest.iter().enumerate().map(|(i, X)| {
                     X + Vec3::from_fn(|c, _| shakes[(3 * i + c) % shakes.len()])
