@@ -18,6 +18,7 @@
 //! | `fem` | the finite-element kernel: model, elements, forces, tangents, the constant matrix |
 //! | `body` | what a user touches: body, builder, set, attachments, settings; the state that a snapshot holds |
 //! | `contact` | obstacles and their shapes, closest features, constraints, queries |
+//! | `skin` | meshes that are drawn in a body's place |
 //! | `solver` | factors, a body's step, the cone problem, constraints of an island and its iteration |
 //! | `coupling` | rapier's sets, read into obstacles and proxies, and the reactions written back |
 //! | `pipeline` | the world, the pipeline and what can be read of a step; inside, the step as a list of verbs |
@@ -76,6 +77,8 @@ mod body;
 
 mod contact;
 
+mod skin;
+
 mod solver;
 
 mod coupling;
@@ -103,6 +106,9 @@ pub use pipeline::{
     DeformableContactForceEvent, DeformableCounters, DeformableEventHandler, DeformablePairContact,
     DeformableParameters, DeformablePipeline, DeformableWorld, JointForce, RigidContact, SolvedJoint,
 };
+#[cfg(feature = "debug-render")]
+pub use pipeline::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};
+pub use skin::DeformableSkin;
 
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
 pub mod prelude {
@@ -113,10 +119,12 @@ pub mod prelude {
         DeformableContactForceEvent, DeformableContactModificationContext, DeformableContactPartner,
         DeformableCounters, DeformableEventHandler, DeformableHooks, DeformableMaterial, DeformableModel,
         DeformablePairContact, DeformablePairFilterContext, DeformableParameters, DeformablePipeline,
-        DeformableSolverContact, DeformableSurfacePoint, DeformableWind, DeformableWorld, Elasticity,
-        FactorPrecision, Fidelity, Frames, Integrator, JointForce, JointRole, PhysicsParts, RigidContact,
-        SolvedJoint, Solver, SolverSettings, Structure, SystemMatrix, TetMesh,
+        DeformableSkin, DeformableSolverContact, DeformableSurfacePoint, DeformableWind, DeformableWorld,
+        Elasticity, FactorPrecision, Fidelity, Frames, Integrator, JointForce, JointRole, PhysicsParts,
+        RigidContact, SolvedJoint, Solver, SolverSettings, Structure, SystemMatrix, TetMesh,
     };
+    #[cfg(feature = "debug-render")]
+    pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};
 }
 
 /// The examples of the README compile and run with the tests.

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the ground up.
-const ROOMS: [&[&str]; 12] = [
+const ROOMS: [&[&str]; 13] = [
     &["math", "profiler", "threads"],
     &["mesh"],
     &["energy"],
@@ -17,6 +17,7 @@ const ROOMS: [&[&str]; 12] = [
     &["fem"],
     &["body"],
     &["contact"],
+    &["skin"],
     &["solver"],
     &["coupling"],
     &["pipeline"],

@@ -157,6 +157,25 @@ impl DeformableAttachment {
         }
     }
 
+    /// From each vertex to where it is attached, in the world \[m\].
+    #[cfg(feature = "debug-render")]
+    pub(crate) fn lines(&self, bodies: &super::set::DeformableBodySet) -> Vec<(Vec3, Vec3)> {
+        let Some(x) = bodies.get(self.body).map(|body| &body.state.x) else { return Vec::new() };
+        let from = self.nodes.iter().map(|n| x[*n as usize]);
+        match &self.anchors {
+            Anchors::World(points) => from.zip(points.iter().copied()).collect(),
+            Anchors::Rigid(_, points) => {
+                let pose = self.rigid_pose;
+                let to = points.iter().filter_map(|p| Some(pose?.transform(p)));
+                from.zip(to).collect()
+            }
+            Anchors::Deformable(other, nodes) => {
+                let Some(other) = bodies.get(*other) else { return Vec::new() };
+                from.zip(nodes.iter().map(|n| other.state.x[*n as usize])).collect()
+            }
+        }
+    }
+
     /// The bodies that it is of and to, if something was changed since this was asked last.
     pub(crate) fn take_changed(&mut self) -> [Option<DeformableBodyHandle>; 2] {
         if std::mem::take(&mut self.changed) { self.bodies() } else { [None; 2] }

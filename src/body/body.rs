@@ -60,6 +60,8 @@ pub struct DeformableBody {
     pub(crate) model: Arc<DeformableModel>,
     pub(crate) state: DeformableState,
     pub(crate) material: DeformableMaterial,
+    /// Where the nodes were before the last step \[m\]; empty if no one may be shown the way from there.
+    pub(crate) before: Vec<Vec3>,
     /// Ascending by node.
     pub(crate) pins: Vec<Pin>,
     /// Pins of its user, while the body is fixed or kinematic and all of its nodes are pinned.
@@ -105,6 +107,7 @@ impl DeformableBody {
             model,
             state,
             material,
+            before: Vec::new(),
             pins: Vec::new(),
             held_pins: Vec::new(),
             body_type: RigidBodyType::Dynamic,
@@ -150,6 +153,7 @@ impl DeformableBody {
         }
         state.check(self.state.x.len()).map_err(|what| BodyError::BadState { what })?;
         self.state = state;
+        self.before.clear();
         // Contacts of another mesh of the same size would name nodes that are not on this surface.
         let surface = &self.model.surface.index_of_node;
         let known = |n: &u32| surface.get(*n as usize).is_some_and(|s| *s != u32::MAX);
@@ -172,6 +176,34 @@ impl DeformableBody {
     /// Positions of the vertices \[m\], rounded to rapier's precision.
     pub fn positions(&self) -> impl ExactSizeIterator<Item = Vector> + '_ {
         self.model.nodes_by_vertex().map(|n| to_real(&self.state.x[n]))
+    }
+
+    /// Positions of the vertices between the last two steps \[m\]: at `t` 0 where the last one began, at 1 where it ended. For
+    /// frames that are not steps; what was set elsewhere since is where it was set.
+    pub fn positions_between(&self, t: f32) -> Vec<Vector> {
+        let x = self.nodes_between(t);
+        self.model.nodes_by_vertex().map(|n| to_real(&x[n])).collect()
+    }
+
+    pub(crate) fn nodes_between(&self, t: f32) -> Vec<Vec3> {
+        let x = &self.state.x;
+        if self.before.len() != x.len() || self.is_sleeping() {
+            return x.clone();
+        }
+        let t = f64::from(t).clamp(0.0, 1.0);
+        self.before.iter().zip(x).map(|(a, b)| a + (b - a) * t).collect()
+    }
+
+    /// Unit normals of the surface at the vertices, by the areas of the triangles around them; zero inside and on rods.
+    pub fn normals(&self) -> Vec<Vector> {
+        let mut normals = vec![Vec3::zeros(); self.state.x.len()];
+        for triangle in &self.model.surface.triangles {
+            let [a, b, c] = triangle.map(|n| self.state.x[n as usize]);
+            let across = (b - a).cross(&(c - a));
+            triangle.iter().for_each(|n| normals[*n as usize] += across);
+        }
+        let unit = |n: usize| to_real(&normals[n].try_normalize(0.0).unwrap_or_default());
+        self.model.nodes_by_vertex().map(unit).collect()
     }
 
     /// Position of a vertex \[m\] in the solver's precision.

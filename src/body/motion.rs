@@ -168,6 +168,7 @@ impl DeformableBody {
         self.state.history.clear();
         let node = self.node(vertex)?;
         finite("position", to_real(&position.into()))?;
+        self.before.clear();
         self.state.x[node] = position.into();
         Ok(())
     }
@@ -200,6 +201,7 @@ impl DeformableBody {
     fn move_by(&mut self, pose: &Pose64) {
         self.wake_up();
         self.state.history.clear();
+        self.before.clear();
         self.state.x.iter_mut().for_each(|x| *x = pose.transform(x));
         self.state.v.iter_mut().for_each(|v| *v = pose.rotation * *v);
         for pin in self.pins.iter_mut().chain(&mut self.held_pins) {

@@ -47,6 +47,8 @@ struct BodyRecord {
     #[serde(skip, default = "no_model")]
     model: Arc<DeformableModel>,
     state: DeformableState,
+    #[serde(skip)]
+    before: Vec<Vec3>,
     material: DeformableMaterial,
     pins: Vec<Pin>,
     held_pins: Vec<Pin>,

@@ -45,7 +45,7 @@ pub(crate) use detection::{Detector, STATIC_MARGIN};
 pub(crate) use obstacle::{Obstacle, ProxyId};
 pub(crate) use pair_scene::Pair;
 pub use queries::DeformableSurfacePoint;
-pub(crate) use queries::overlaps;
+pub(crate) use queries::{nearest_weights, overlaps};
 pub(crate) use soft_contact::SoftDetector;
 pub(crate) use soft_surface::{SoftPair, SoftSurface};
 pub(crate) use speculative::{SpeculativePoint, placed, speculative_points};

@@ -194,6 +194,11 @@ impl Structure {
         &self.vertices
     }
 
+    /// Vertices along each rod.
+    pub(crate) fn rods(&self) -> impl Iterator<Item = &[u32]> {
+        self.rods.iter().map(|rod| &rod.points[..])
+    }
+
     /// Four vertex indices per tetrahedron.
     pub fn tetrahedra(&self) -> &[[u32; 4]] {
         &self.tetrahedra

@@ -9,9 +9,13 @@ mod step;
 #[allow(clippy::module_inception)]
 mod pipeline;
 
+#[cfg(feature = "debug-render")]
+mod debug_render;
 mod world;
 
 pub use contacts::{DeformableContact, DeformablePairContact, JointForce, RigidContact, SolvedJoint};
+#[cfg(feature = "debug-render")]
+pub use debug_render::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};
 pub use events::{
     DeformableChannelEventCollector, DeformableCollisionEvent, DeformableContactForceEvent,
     DeformableEventHandler,

@@ -103,6 +103,7 @@ pub(super) fn store(
         body.state.history.v.clear();
     }
     body.advance_pins(h);
+    body.before.clone_from(&body.state.x);
     body.state.x.clone_from(&problem.current.x);
     let share = problem.pin_share();
     for pin in &mut body.pins {

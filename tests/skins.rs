@@ -1,0 +1,205 @@
+//! Meshes that follow bodies.
+
+mod common;
+
+use foible3d::BodyError;
+use foible3d::prelude::*;
+use proptest::prelude::*;
+use rapier3d::prelude::*;
+
+fn vector(size: f32) -> impl Strategy<Value = Vector> {
+    [-size..size, -size..size, -size..size].prop_map(Vector::from)
+}
+
+/// Sets every vertex by a map of its rest position.
+fn move_by(body: &mut DeformableBody, map: impl Fn([f64; 3]) -> [f64; 3]) {
+    for v in 0..body.vertex_count() {
+        let to = map(body.model().rest_position(v));
+        body.set_position(v, to).unwrap();
+    }
+}
+
+/// `M p + t` with the columns of M.
+fn affine(columns: [Vector; 3], t: Vector, p: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|r| (0..3).map(|c| f64::from(columns[c][r]) * p[c]).sum::<f64>() + f64::from(t[r]))
+}
+
+fn deform(columns: [Vector; 3], t: Vector, p: Vector) -> Vector {
+    let [x, y, z] = affine(columns, t, p.to_array().map(f64::from));
+    Vector::new(x as f32, y as f32, z as f32)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    /// Inside and outside of lattices and filled shapes; normals as cross products of what lies in the surface.
+    #[test]
+    fn skins_of_solids_follow_affine_motions(
+        shake in [vector(0.4), vector(0.4), vector(0.4)], t in vector(50.0), kind in 0usize..3,
+        points in proptest::collection::vec((vector(0.7), vector(1.0)), 20),
+    ) {
+        let builder = match kind {
+            0 => DeformableBodyBuilder::cuboid(Vector::splat(0.5), [3, 4, 5]),
+            1 => DeformableBodyBuilder::filled(&Ball::new(0.5), 0.2),
+            _ => DeformableBodyBuilder::cuboid(Vector::splat(0.5), [2; 3]).smoothed(),
+        };
+        let mut body = builder.build().unwrap();
+        let columns = [Vector::X + shake[0], Vector::Y + shake[1], Vector::Z + shake[2]];
+        let determinant = columns[0].dot(columns[1].cross(columns[2]));
+        prop_assume!(determinant > 0.05);
+        let vertices: Vec<Vector> = points.iter().map(|(p, _)| *p).collect();
+        let normals: Vec<Vector> = points.iter().map(|(_, n)| n.normalize_or(Vector::Y)).collect();
+        let skin = DeformableSkin::bind(body.model(), &vertices, &normals).unwrap();
+        prop_assert_eq!(skin.vertex_count(), 20);
+        move_by(&mut body, |p| affine(columns, t, p));
+        let (mut positions, mut turned) = (vertices.clone(), normals.clone());
+        skin.update(&body, &mut positions, &mut turned).unwrap();
+        for i in 0..20 {
+            let expected = deform(columns, t, vertices[i]);
+            // f32 keeps 4e-6 at 50 m.
+            prop_assert!((positions[i] - expected).length() < 2e-5, "{} {}", positions[i], expected);
+            let side = normals[i].any_orthonormal_vector();
+            let zero = Vector::ZERO;
+            let [a, b] = [side, normals[i].cross(side)].map(|s| deform(columns, zero, s));
+            let expected = a.cross(b).normalize();
+            prop_assert!((turned[i] - expected).length() < 1e-4, "{} {}", turned[i], expected);
+        }
+    }
+
+    /// Both sides of a sheet, turned and stretched in its plane.
+    #[test]
+    fn skins_of_sheets_keep_their_thickness(
+        turn in vector(3.0), t in vector(5.0), stretch in (0.5f32..2.0, 0.5f32..2.0), up in any::<bool>(),
+        points in proptest::collection::vec((-0.5f32..0.5, -0.4f32..0.4), 10),
+    ) {
+        let mut body = DeformableBodyBuilder::cloth([0.5, 0.4], [5, 4], 0.02).build().unwrap();
+        let side = if up { 1.0 } else { -1.0 };
+        let vertices: Vec<Vector> = points.iter().map(|(x, z)| Vector::new(*x, 0.01 * side, *z)).collect();
+        let normals = vec![Vector::Y * side; 10];
+        let skin = DeformableSkin::bind(body.model(), &vertices, &normals).unwrap();
+        let turn = Rotation::from_scaled_axis(turn);
+        let map = |p: Vector| turn * (p * Vector::new(stretch.0, 1.0, stretch.1)) + t;
+        move_by(&mut body, |p| map(Vector::new(p[0] as f32, p[1] as f32, p[2] as f32)).to_array().map(f64::from));
+        let (mut positions, mut turned) = (vertices.clone(), normals.clone());
+        skin.update(&body, &mut positions, &mut turned).unwrap();
+        for i in 0..10 {
+            prop_assert!((positions[i] - map(vertices[i])).length() < 1e-5);
+            prop_assert!((turned[i] - turn * normals[i]).length() < 1e-4);
+        }
+    }
+}
+
+#[test]
+fn tubes_along_ropes_keep_their_radius_and_do_not_turn_about_themselves() {
+    let points: Vec<Vector> = (0..=20).map(|k| Vector::X * (0.05 * k as f32)).collect();
+    let mut body = DeformableBodyBuilder::rope(&points, 0.02).build().unwrap();
+    // A tube of twelve sides with caps.
+    let ring = |x: f32, k: usize| {
+        let angle = std::f32::consts::TAU * k as f32 / 12.0;
+        (Vector::new(x, 0.02 * angle.cos(), 0.02 * angle.sin()), Vector::new(0.0, angle.cos(), angle.sin()))
+    };
+    let tube: Vec<(Vector, Vector)> =
+        (0..=40).flat_map(|j| (0..12).map(move |k| ring(j as f32 / 40.0, k))).collect();
+    let vertices: Vec<Vector> = tube.iter().map(|(p, _)| *p).collect();
+    let normals: Vec<Vector> = tube.iter().map(|(_, n)| *n).collect();
+    let skin = DeformableSkin::bind(body.model(), &vertices, &normals).unwrap();
+    // Bent to three quarters of a circle, in the plane of x and y.
+    let bend = |x: f64| {
+        let angle = 1.5 * std::f64::consts::PI * x;
+        let r = 1.0 / (1.5 * std::f64::consts::PI);
+        ([r * angle.sin(), r * (1.0 - angle.cos()), 0.0], angle)
+    };
+    move_by(&mut body, |p| bend(p[0]).0);
+    let (mut positions, mut turned) = (vertices.clone(), normals.clone());
+    skin.update(&body, &mut positions, &mut turned).unwrap();
+    for (i, (rest, normal)) in tube.iter().enumerate() {
+        let (at, angle) = bend(f64::from(rest.x));
+        let at = Vector::from(at.map(|c| c as f32));
+        let across = Vector::new(-angle.sin() as f32, angle.cos() as f32, 0.0);
+        let expected = across * normal.y + Vector::Z * normal.z;
+        // Segments are chords of 13.5°: r (1 − cos 6.75°) inside, directions half of that off.
+        assert!((positions[i] - (at + expected * 0.02)).length() < 5e-3, "{i}: {} {}", positions[i], at);
+        assert!((turned[i] - expected).length() < 0.13, "{i}: {} {}", turned[i], expected);
+    }
+    // Carried as a whole.
+    let by =
+        Pose::from_parts(Vector::new(1.0, 2.0, 3.0), Rotation::from_scaled_axis(Vector::new(0.0, 0.7, 0.9)));
+    let mut body = DeformableBodyBuilder::rope(&points, 0.02).build().unwrap();
+    body.teleport(by).unwrap();
+    skin.update(&body, &mut positions, &mut turned).unwrap();
+    for (i, (rest, _)) in tube.iter().enumerate() {
+        assert!((positions[i] - by.transform_point(*rest)).length() < 1e-5, "{i}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let body = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [1; 3]).build().unwrap();
+    let other = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2; 3]).build().unwrap();
+    let wrong = |vertices, expected| Err(BodyError::WrongSize { vertices, expected });
+    let bind = |p: &[Vector], n: &[Vector]| DeformableSkin::bind(body.model(), p, n).map(drop);
+    assert_eq!(bind(&[Vector::X; 3], &[Vector::Y; 2]), wrong(2, 3));
+    assert!(matches!(bind(&[Vector::X * f32::NAN], &[Vector::Y]), Err(BodyError::NotFinite { .. })));
+    let skin = DeformableSkin::bind(body.model(), &[Vector::X], &[Vector::ZERO]).unwrap();
+    let (mut p, mut n) = ([Vector::ZERO; 1], [Vector::ONE; 1]);
+    skin.update(&body, &mut p, &mut n).unwrap();
+    assert!((p[0] - Vector::X).length() < 1e-6 && n[0] == Vector::ZERO);
+    assert_eq!(skin.update(&other, &mut p, &mut n), wrong(27, 8));
+    assert_eq!(skin.update(&body, &mut [], &mut n), wrong(0, 1));
+}
+
+#[test]
+fn frames_between_steps_are_between_them() {
+    let mut physics = PhysicsWorld::new();
+    let mut world = DeformableWorld::new();
+    let body =
+        world.insert(DeformableBodyBuilder::cuboid(Vector::splat(0.1), [1; 3]).linvel(Vector::X)).unwrap();
+    let all = |body: &DeformableBody| body.positions().collect::<Vec<_>>();
+    let first = all(&world.bodies[body]);
+    assert_eq!(world.bodies[body].positions_between(0.5), first, "before the first step");
+    world.step(&mut physics);
+    let second = all(&world.bodies[body]);
+    assert_eq!(world.bodies[body].positions_between(0.0), first);
+    assert_eq!(world.bodies[body].positions_between(1.0), second);
+    let half = world.bodies[body].positions_between(0.5);
+    for i in 0..8 {
+        assert!((half[i] - (first[i] + second[i]) * 0.5).length() < 1e-7);
+    }
+    let skin = DeformableSkin::bind(world.bodies[body].model(), &[Vector::ZERO], &[Vector::Y]).unwrap();
+    let (mut p, mut n) = ([Vector::ZERO; 1], [Vector::ZERO; 1]);
+    skin.update_interpolated(&world.bodies[body], 0.5, &mut p, &mut n).unwrap();
+    let middle = half.iter().sum::<Vector>() / 8.0;
+    assert!((p[0] - middle).length() < 1e-6);
+    // What is put somewhere is there at once.
+    world.bodies[body].teleport(Pose::from_translation(Vector::Y * 9.0)).unwrap();
+    assert_eq!(world.bodies[body].positions_between(0.0), all(&world.bodies[body]));
+}
+
+#[test]
+fn geometry_is_read_in_the_order_of_the_users_vertices() {
+    let mesh = TetMesh::cuboid([0.2, 0.3, 0.4], [2, 3, 4]).unwrap();
+    let body = DeformableBodyBuilder::mesh(&mesh).build().unwrap();
+    let sorted = |tets: Vec<[u32; 4]>| {
+        let mut tets: Vec<[u32; 4]> = tets
+            .into_iter()
+            .map(|mut t| {
+                t.sort_unstable();
+                t
+            })
+            .collect();
+        tets.sort_unstable();
+        tets
+    };
+    assert_eq!(sorted(body.model().tetrahedra().collect()), sorted(mesh.tetrahedra().to_vec()));
+    let normals = body.normals();
+    for (p, n) in body.positions().zip(&normals) {
+        let half = [0.2f32, 0.3, 0.4];
+        let out =
+            Vector::from([0, 1, 2].map(|k| if p[k].abs() > half[k] - 1e-6 { p[k].signum() } else { 0.0 }));
+        match out == Vector::ZERO {
+            true => assert_eq!(*n, Vector::ZERO),
+            // On edges and corners somewhere between the faces.
+            false => assert!(n.dot(out) > 0.5 && (n.length() - 1.0).abs() < 1e-5, "{p} {n}"),
+        }
+    }
+}
