@@ -36,16 +36,18 @@ mod soft_contact;
 mod speculative;
 mod tunnelling_stop;
 
+mod nearest_facet;
 mod queries;
 
 pub(crate) use box_tree::BoxTree;
 pub(crate) use candidates::Candidates;
 pub(crate) use constraint::{Constraint, Endpoint, Law};
 pub(crate) use detection::{Detector, STATIC_MARGIN};
+pub(crate) use nearest_facet::{NearestFacet, nearest_weights};
 pub(crate) use obstacle::{Obstacle, ProxyId};
 pub(crate) use pair_scene::Pair;
 pub use queries::DeformableSurfacePoint;
-pub(crate) use queries::{nearest_weights, overlaps};
+pub(crate) use queries::overlaps;
 pub(crate) use soft_contact::SoftDetector;
 pub(crate) use soft_surface::{SoftPair, SoftSurface};
 pub(crate) use speculative::{SpeculativePoint, placed, speculative_points};

@@ -6,7 +6,7 @@ use crate::math::{Vec3, from_real, to_real};
 use crate::mesh::tetrahedron_holds;
 use parry3d::bounding_volume::BoundingVolume;
 use parry3d::math::{Pose, Vector};
-use parry3d::query::{PointQuery, PointQueryWithLocation, Ray, RayCast, intersection_test};
+use parry3d::query::{PointQuery, Ray, RayCast, intersection_test};
 use parry3d::shape::{Shape, Triangle};
 
 /// A point on the surface of a deformable body, and what holds it there while the body moves.
@@ -130,13 +130,6 @@ impl DeformableBodySet {
             distance,
         })
     }
-}
-
-/// Weights of the point of a triangle that is nearest to p.
-pub(crate) fn nearest_weights(corners: [Vec3; 3], p: &Vec3) -> [f64; 3] {
-    let [a, b, c] = corners.map(|corner| to_real(&corner));
-    let (_, location) = Triangle::new(a, b, c).project_local_point_and_get_location(to_real(p), false);
-    location.barycentric_coordinates().map_or([1.0, 0.0, 0.0], |weights| weights.map(f64::from))
 }
 
 /// Whether a shape touches a body or lies in it.

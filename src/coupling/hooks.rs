@@ -301,11 +301,16 @@ fn shown(constraint: &Constraint, place: usize, sign: f64, point: Vec3) -> Defor
 
 /// Takes over what a hook has set for a step \[s\], negative where the partner is endpoint 0; NaN is zero.
 fn apply(contact: &DeformableSolverContact, constraint: &mut Constraint, step: f64) {
-    constraint.law = Law::Contact { friction: contact.friction.max(0.0).min(MOST_FRICTION) };
-    constraint.restitution = contact.restitution.max(0.0).min(1.0);
+    constraint.law = Law::Contact { friction: within(contact.friction, MOST_FRICTION) };
+    constraint.restitution = within(contact.restitution, 1.0);
     if contact.tangent_velocity.is_finite() {
         let [normal, ..] = constraint.frame;
         let motion = from_real(contact.tangent_velocity) * step;
         constraint.surface_motion = motion - normal * normal.dot(&motion);
     }
+}
+
+/// From zero to `most`; zero if it is NaN.
+fn within(value: f64, most: f64) -> f64 {
+    if value > 0.0 { value.min(most) } else { 0.0 }
 }

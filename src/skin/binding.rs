@@ -4,7 +4,8 @@ use super::rod_frames::Frame;
 use super::tet_grid::TetGrid;
 use crate::contact::nearest_weights;
 use crate::fem::DeformableModel;
-use crate::math::{Vec3, tangents, to_real};
+use crate::math::{Vec3, tangents};
+use parry3d::glamx::Vec3A;
 use rapier3d::math::Vector;
 
 /// A vertex, and its normal.
@@ -18,80 +19,68 @@ pub(super) enum Binding {
     Rod { nodes: [u32; 2], segment: u32, along: f32, across: [f32; 2], normal: [f32; 3] },
 }
 
-/// What bindings are read with.
+/// What bindings are read with: in single precision, and all that is far from the origin in `origin` alone.
 #[derive(Default)]
 pub(super) struct Motion {
-    /// Nodes of the body \[m\].
-    pub x: Vec<Vec3>,
+    /// A place in the body \[m\].
+    pub origin: Vec3A,
+    /// Nodes of the body from there \[m\].
+    pub x: Vec<Vec3A>,
     /// Unit normals of the sheets at nodes.
-    pub normals: Vec<Vec3>,
+    pub normals: Vec<Vec3A>,
     /// Frames of the segments of all rods.
-    pub frames: Vec<Frame>,
+    pub frames: Vec<[Vec3A; 3]>,
 }
 
 impl Binding {
     /// Place and unit normal in the world.
     #[inline]
     pub fn read(&self, motion: &Motion) -> (Vector, Vector) {
-        let at = |n: u32| &motion.x[n as usize];
-        match self {
-            Self::Solid { nodes, place, tangents } => {
+        let at = |n: u32| motion.x[n as usize];
+        let (place, normal) = match self {
+            Self::Solid { nodes, place, tangents: [s, t] } => {
                 let first = at(nodes[0]);
                 let ways = [1, 2, 3].map(|k| at(nodes[k]) - first);
-                let sum = |w: &[f32; 3]| -> Vec3 {
-                    let [a, b, c] = w.map(f64::from);
-                    ways[0] * a + ways[1] * b + ways[2] * c
-                };
-                let normal = sum(&tangents[0]).cross(&sum(&tangents[1]));
-                (to_real(&(first + sum(place))), unit(&normal))
+                let sum = |[a, b, c]: &[f32; 3]| ways[0] * *a + ways[1] * *b + ways[2] * *c;
+                (first + sum(place), unit(sum(s).cross(sum(t))))
             }
-            Self::Sheet { nodes, weights, height, side } => {
-                let mix = |of: &[Vec3]| {
-                    let terms = nodes.iter().zip(weights);
-                    terms.fold(Vec3::zeros(), |sum, (n, w)| sum + of[*n as usize] * f64::from(*w))
-                };
-                let normal = mix(&motion.normals).try_normalize(0.0).unwrap_or_default();
-                (
-                    to_real(&(mix(&motion.x) + normal * f64::from(*height))),
-                    to_real(&(normal * f64::from(*side))),
-                )
+            Self::Sheet { nodes: [i, j, k], weights: [a, b, c], height, side } => {
+                let mix = |of: &[Vec3A]| of[*i as usize] * *a + of[*j as usize] * *b + of[*k as usize] * *c;
+                let normal = unit(mix(&motion.normals));
+                (mix(&motion.x) + normal * *height, normal * *side)
             }
-            Self::Rod { nodes, segment, along, across, normal } => {
-                let [a, b] = nodes.map(at);
+            Self::Rod { nodes, segment, along, across, normal: [a, b, c] } => {
+                let [from, to] = nodes.map(at);
                 let [u, v, t] = &motion.frames[*segment as usize];
-                let place =
-                    a + (b - a) * f64::from(*along) + u * f64::from(across[0]) + v * f64::from(across[1]);
-                let normal = {
-                    let [a, b, c] = normal.map(f64::from);
-                    u * a + v * b + t * c
-                };
-                (to_real(&place), unit(&normal))
+                let place = from + (to - from) * *along + *u * across[0] + *v * across[1];
+                (place, unit(*u * *a + *v * *b + *t * *c))
             }
-        }
+        };
+        ((motion.origin + place).into(), normal.into())
     }
 }
 
-/// In `f32`, after the differences have been taken: nothing cancels any more.
-fn unit(v: &Vec3) -> Vector {
-    to_real(&(v / v.amax().max(f64::MIN_POSITIVE))).normalize_or_zero()
+/// Zero stays zero.
+#[inline]
+fn unit(v: Vec3A) -> Vec3A {
+    v * (1.0 / v.length().max(f32::MIN_POSITIVE))
+}
+
+/// In single precision.
+pub(super) fn single(v: &Vec3) -> Vec3A {
+    Vec3A::new(v.x as f32, v.y as f32, v.z as f32)
 }
 
 fn singles(v: &Vec3) -> [f32; 3] {
     [v.x, v.y, v.z].map(|c| c as f32)
 }
 
-/// To the tetrahedron that holds a point, or is nearest.
-pub(super) fn bind_to_solid(
-    grid: &TetGrid<'_>,
-    model: &DeformableModel,
-    p: &Vec3,
-    normal: &Vec3,
-) -> Option<Binding> {
-    let (tet, inverse, first) = grid.find(p)?;
-    let nodes = model.tetrahedra[tet as usize];
+/// To a tetrahedron.
+pub(super) fn bind_to_solid(grid: &TetGrid<'_>, tet: u32, p: &Vec3, normal: &Vec3) -> Binding {
+    let (nodes, first, inverse) = grid.weights(tet);
     let sides = normal.try_normalize(0.0).map_or([Vec3::zeros(); 2], |n| tangents(&n));
     let tangents = sides.map(|side| singles(&(inverse * side)));
-    Some(Binding::Solid { nodes, place: singles(&(inverse * (p - first))), tangents })
+    Binding::Solid { nodes, place: singles(&(inverse * (p - first))), tangents }
 }
 
 /// To a triangle of a sheet, with the rest normals of its corners; and how far it is \[m\].

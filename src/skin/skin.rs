@@ -1,9 +1,10 @@
 //! The skin of a body.
 
-use super::binding::{Binding, Motion, bind_to_segment, bind_to_solid, bind_to_triangle};
+use super::binding::{Binding, Motion, bind_to_segment, bind_to_solid, bind_to_triangle, single};
 use super::rod_frames::{Frame, frames};
 use super::tet_grid::TetGrid;
 use crate::body::DeformableBody;
+use crate::contact::NearestFacet;
 use crate::error::BodyError;
 use crate::fem::DeformableModel;
 use crate::math::{Vec3, from_real};
@@ -69,19 +70,24 @@ impl DeformableSkin {
         }
         let sheets = &model.surface.triangles[model.surface.closed..];
         let normals_at_rest = sheet_normals(model, &model.rest);
-        let grid = (!model.tetrahedra.is_empty()).then(|| TetGrid::new(model));
+        let mut grid = (!model.tetrahedra.is_empty()).then(|| TetGrid::new(model));
+        let ends = segments.iter().map(|(ends, ..)| *ends).collect();
+        let nearest = NearestFacet::new(&model.rest, sheets, ends);
         for (p, normal) in vertices.iter().zip(normals) {
             let (p, normal) = (from_real(*p), from_real(*normal));
-            let solid = || bind_to_solid(grid.as_ref()?, model, &p, &normal);
-            let sheet = sheets.iter().map(|t| bind_to_triangle(model, *t, &normals_at_rest, &p, &normal));
-            let rod = segments
-                .iter()
-                .map(|(ends, i, frame)| bind_to_segment(model, (*ends, *i, frame), &p, &normal));
-            let thin = sheet.chain(rod).min_by(|a, b| a.0.total_cmp(&b.0));
+            let solid = grid.as_mut().and_then(|grid| grid.nearest(&p));
+            let sheet = nearest.triangle(&p);
+            let sheet = sheet.map(|t| bind_to_triangle(model, sheets[t], &normals_at_rest, &p, &normal));
+            let rod = nearest.segment(&p).map(|i| segments[i]);
+            let rod = rod.map(|(ends, i, frame)| bind_to_segment(model, (ends, i, &frame), &p, &normal));
+            let thin = sheet.into_iter().chain(rod).min_by(|a, b| a.0.total_cmp(&b.0));
             // What is in a solid belongs to it; beside one with thin parts the nearest does.
-            let binding = match thin {
-                Some((away, thin)) if grid.as_ref().is_none_or(|grid| grid.distance(&p) > away) => Some(thin),
-                _ => solid(),
+            let binding = match (thin, solid, &grid) {
+                (Some((away, thin)), solid, _) if solid.is_none_or(|(outside, _)| outside > away) => {
+                    Some(thin)
+                }
+                (_, Some((_, tet)), Some(grid)) => Some(bind_to_solid(grid, tet, &p, &normal)),
+                (thin, ..) => thin.map(|(_, thin)| thin),
             };
             skin.uses_sheets |= matches!(binding, Some(Binding::Sheet { .. }));
             skin.bindings.extend(binding);
@@ -136,14 +142,17 @@ impl DeformableSkin {
                 return Err(BodyError::WrongSize { vertices, expected });
             }
         }
-        let mut motion = Motion { x, ..Motion::default() };
+        // What `f32` cannot tell of a place far away is the same for all vertices.
+        let origin = x[0];
+        let mut motion = Motion { origin: single(&origin), ..Motion::default() };
+        motion.x.extend(x.iter().map(|x| single(&(x - origin))));
         if self.uses_sheets {
-            motion.normals = sheet_normals(&body.model, &motion.x);
+            motion.normals.extend(sheet_normals(&body.model, &x).iter().map(single));
         }
         let mut own = Vec::new();
         for (nodes, first) in &self.rods {
-            frames(nodes.iter().map(|n| motion.x[*n as usize]), Some(first), &mut own);
-            motion.frames.append(&mut own);
+            frames(nodes.iter().map(|n| x[*n as usize]), Some(first), &mut own);
+            motion.frames.extend(own.iter().map(|frame| frame.each_ref().map(single)));
         }
         let chunks = self.bindings.chunks(CHUNK).zip(positions.chunks_mut(CHUNK));
         let mut chunks: Vec<_> = chunks.collect();
