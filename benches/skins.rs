@@ -1,4 +1,5 @@
-//! Skins: what it takes to bind vertices, and to write them every frame, on one thread; beside a step of the body.
+//! Skins: what it takes to bind vertices, and to write them every frame, on one thread; beside a step of the body. And what it
+//! takes to show the body to rapier's queries.
 //! `cargo bench --bench skins`
 
 use foible3d::prelude::*;
@@ -39,9 +40,13 @@ fn skin(name: &str, builder: DeformableBodyBuilder, skin: Vec<(Vector, Vector)>,
         let body = &world.bodies[handle];
         updates.push(milliseconds(&mut || bound.update(body, &mut positions, &mut turned).unwrap()));
     }
+    let mut colliders = DeformableColliders::new();
+    colliders.update(&world.bodies, &mut physics.colliders);
+    let refit = || milliseconds(&mut || drop(colliders.update(&world.bodies, &mut physics.colliders)));
+    let (refit, _) = spread(std::iter::repeat_with(refit).take(FRAMES).collect());
     let ((step, _), (update, worst)) = (spread(steps), spread(updates));
     println!(
-        "{name:8} {:6} vertices on {:5}: bound in {binding:6.2} ms, written in {update:.3} ms (worst {worst:.3}), {:.2} of a step",
+        "{name:8} {:6} vertices on {:5}: bound in {binding:6.2} ms, written in {update:.3} ms (worst {worst:.3}), {:.2} of a step; collider refitted in {refit:.3} ms",
         positions.len(),
         model.vertex_count(),
         update / step
@@ -67,7 +72,7 @@ fn main() {
             .map(|(u, n)| (Vector::new(u, 0.02 * n.x, 0.02 * n.z), Vector::new(0.0, n.x, n.z)))
             .collect();
         let rope: Vec<Vector> = (0..=40).map(|k| Vector::X * (k as f32 / 40.0)).collect();
-        skin("ball", DeformableBodyBuilder::filled(&Ball::new(0.5), 0.16), ball, 0.6);
+        skin("ball", DeformableBodyBuilder::filled(&Ball::new(0.5), 0.16), ball, 0.45);
         skin("sheet", DeformableBodyBuilder::cloth([0.5; 2], [15, 15], 0.002), sheet, 1.5);
         skin("tube", DeformableBodyBuilder::rope(&rope, 0.02), tube, 6.0);
     });

@@ -93,7 +93,7 @@ pub use body::{
 };
 pub use contact::DeformableSurfacePoint;
 pub use coupling::{
-    DeformableContactModificationContext, DeformableHooks, DeformablePairFilterContext,
+    DeformableColliders, DeformableContactModificationContext, DeformableHooks, DeformablePairFilterContext,
     DeformableSolverContact, PhysicsParts,
 };
 pub use energy::Elasticity;
@@ -115,7 +115,7 @@ pub mod prelude {
     pub use crate::{
         Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
         DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
-        DeformableChannelEventCollector, DeformableCollisionEvent, DeformableContact,
+        DeformableChannelEventCollector, DeformableColliders, DeformableCollisionEvent, DeformableContact,
         DeformableContactForceEvent, DeformableContactModificationContext, DeformableContactPartner,
         DeformableCounters, DeformableEventHandler, DeformableHooks, DeformableMaterial, DeformableModel,
         DeformablePairContact, DeformablePairFilterContext, DeformableParameters, DeformablePipeline,

@@ -13,6 +13,8 @@ mod mass_properties;
 mod articulations;
 mod shape_meshes;
 
+mod query_colliders;
+
 mod scene;
 
 mod joint_constraints;
@@ -37,5 +39,6 @@ pub(crate) use hooks::{HookedPair, pose_of};
 pub(crate) use neighbourhood::{RigidNeighbourhood, WalkContext};
 pub use parts::PhysicsParts;
 pub(crate) use parts::{RapierSets, StepContext, body_handle, collider_handle, impulse_joint_handle, packed};
+pub use query_colliders::DeformableColliders;
 pub(crate) use reactions::Reactions;
 pub(crate) use scene::RapierScene;

@@ -3,6 +3,7 @@
 use super::articulations::{ArticulatedLinks, ReadArticulation, read_articulation};
 use super::mass_properties::proxy_of;
 use super::parts::{RapierSets, StepContext, packed};
+use super::query_colliders::is_for_queries;
 use super::shape_meshes::ShapeMeshes;
 use crate::contact::{Obstacle, ProxyId};
 use crate::math::{Mat3, Pose64, Vec3, rotation_from_vector};
@@ -41,7 +42,7 @@ impl RapierScene {
         self.proxy_of_body.clear();
         self.meshes.begin();
         for (handle, collider) in context.sets.colliders.iter() {
-            if !collider.is_enabled() {
+            if !collider.is_enabled() || is_for_queries(collider) {
                 continue;
             }
             let body = collider.parent().and_then(|h| Some((h, context.sets.bodies.get(h)?)));

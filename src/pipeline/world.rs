@@ -5,7 +5,7 @@ use super::events::{DeformableCollisionEvent, DeformableContactForceEvent, Defor
 use super::parameters::{DeformableCounters, DeformableParameters};
 use super::pipeline::DeformablePipeline;
 use crate::body::{DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet};
-use crate::coupling::{DeformableHooks, PhysicsParts};
+use crate::coupling::{DeformableColliders, DeformableHooks, PhysicsParts};
 use crate::error::DeformableBodyError;
 use rapier3d::geometry::ColliderHandle;
 use rapier3d::math::Vector;
@@ -36,6 +36,9 @@ pub struct DeformableWorld {
     pub bodies: DeformableBodySet,
     /// World-wide parameters.
     pub parameters: DeformableParameters,
+    /// Colliders with which rapier's queries, character controllers and vehicles see the bodies; none unless asked for, as
+    /// they are refitted in every step.
+    pub query_colliders: Option<DeformableColliders>,
     /// Memory and caches of the step.
     #[cfg_attr(feature = "serde-serialize", serde(skip))]
     pub pipeline: DeformablePipeline,
@@ -44,7 +47,12 @@ pub struct DeformableWorld {
 /// Of what the world holds; the copy makes its caches anew.
 impl Clone for DeformableWorld {
     fn clone(&self) -> Self {
-        Self { bodies: self.bodies.clone(), parameters: self.parameters, pipeline: DeformablePipeline::new() }
+        Self {
+            bodies: self.bodies.clone(),
+            parameters: self.parameters,
+            query_colliders: self.query_colliders.clone(),
+            pipeline: DeformablePipeline::new(),
+        }
     }
 }
 
@@ -98,6 +106,10 @@ impl DeformableWorld {
         let mut parts = PhysicsParts::from(&mut *physics);
         self.pipeline.before_step_with_hooks(&self.parameters, &mut self.bodies, &mut parts, hooks);
         self.pipeline.send_events(&self.bodies, &physics.colliders, events);
+        if let Some(colliders) = &mut self.query_colliders {
+            let gone = colliders.update(&self.bodies, &mut physics.colliders);
+            gone.into_iter().for_each(|collider| drop(physics.remove_collider(collider)));
+        }
         physics.step_with_events(hooks, events);
         self.pipeline.after_step(&mut PhysicsParts::from(physics));
     }
