@@ -1,8 +1,8 @@
-//! What a game does to a body: velocities, poses, kinds of bodies, sleep, pins that move, wind.
+//! What a game does to a body: velocities, poses, sleep, handles.
 
 mod common;
 
-use common::{G, world_with_floor};
+use common::world_with_floor;
 use foible3d::BodyError;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
@@ -12,13 +12,6 @@ const H: f32 = 1.0 / 60.0;
 fn cuboid(half: Vector, cells: [usize; 3]) -> DeformableBodyBuilder {
     let rubber = DeformableMaterial::new(2.0e5, 0.3).mass_damping(1.0).friction(0.5);
     DeformableBodyBuilder::cuboid(half, cells).material(rubber)
-}
-
-fn weightless() -> PhysicsWorld {
-    let mut physics = PhysicsWorld::new();
-    physics.gravity = Vector::ZERO;
-    physics.integration_parameters.dt = H;
-    physics
 }
 
 fn near(a: [f64; 3], b: [f64; 3], by: f64) -> bool {
@@ -131,210 +124,6 @@ fn thresholds_of_sleep_are_a_bodys_own() {
 }
 
 #[test]
-fn a_fixed_body_carries_and_is_let_go_as_it_was() {
-    let (mut physics, _) = world_with_floor(H);
-    let mut world = DeformableWorld::new();
-    let slab =
-        cuboid(Vector::new(0.5, 0.05, 0.5), [5, 1, 5]).translation(Vector::Y * 0.5).pinned(|x| x.x < -0.49);
-    let slab = world.insert(slab.body_type(RigidBodyType::Fixed)).unwrap();
-    let soft =
-        world.insert(cuboid(Vector::splat(0.1), [2; 3]).translation(Vector::new(0.2, 0.66, 0.0))).unwrap();
-    let rigid = RigidBodyBuilder::dynamic().translation(Vector::new(-0.2, 0.66, 0.0)).can_sleep(false);
-    let (rigid, _) = physics.insert(rigid, ColliderBuilder::cuboid(0.1, 0.1, 0.1).density(1000.0));
-    assert_eq!(world.bodies[slab].pinned().len(), 12);
-    let before = world.bodies[slab].state().clone();
-    for _ in 0..180 {
-        world.step(&mut physics);
-    }
-    let positions = |body: &DeformableBody| {
-        (0..body.vertex_count()).map(|v| body.position(v).unwrap()).collect::<Vec<_>>()
-    };
-    let mut there = world.bodies[slab].clone();
-    there.restore(before).unwrap();
-    assert_eq!(positions(&world.bodies[slab]), positions(&there), "it has not moved by a bit");
-    assert!((world.bodies[soft].center_of_mass()[1] - 0.65).abs() < 2e-3);
-    assert!((physics.bodies[rigid].translation().y - 0.65).abs() < 1e-3);
-    // Both weights, the slab's own is no one's.
-    let force = world.bodies[slab].pin_force();
-    let expected =
-        (world.bodies[soft].mass() + f64::from(physics.bodies[rigid].mass()) + world.bodies[slab].mass()) * G;
-    assert!((force[1] - expected).abs() < 1e-2 * expected, "{force:?} {expected}");
-    world.bodies[slab].set_body_type(RigidBodyType::Dynamic);
-    for _ in 0..60 {
-        world.step(&mut physics);
-    }
-    let slab = &world.bodies[slab];
-    assert_eq!(slab.pinned().len(), 12);
-    assert!(slab.aabb().mins.y < 0.3, "its free end hangs down");
-    let held = slab.pinned().map(|v| slab.position(v).unwrap()[0]).fold(f64::NEG_INFINITY, f64::max);
-    assert!(held < -0.499);
-}
-
-#[test]
-fn kinematic_bodies_carry_what_lies_on_them() {
-    for by_velocity in [false, true] {
-        let (mut physics, _) = world_with_floor(H);
-        let mut world = DeformableWorld::new();
-        let kind = if by_velocity {
-            RigidBodyType::KinematicVelocityBased
-        } else {
-            RigidBodyType::KinematicPositionBased
-        };
-        let lift =
-            cuboid(Vector::new(0.5, 0.05, 0.5), [5, 1, 5]).translation(Vector::Y * 0.2).body_type(kind);
-        let lift = world.insert(lift).unwrap();
-        let load = cuboid(Vector::splat(0.1), [2; 3]).translation(Vector::new(0.2, 0.355, 0.0));
-        let load = world.insert(load).unwrap();
-        let (speed, turn) = (0.3, 0.5);
-        if by_velocity {
-            world.bodies[lift].set_vels(Vector::Y * speed, Vector::Y * turn).unwrap();
-        }
-        let before = world.bodies[lift].elastic_energy();
-        for step in 1..=120 {
-            if !by_velocity {
-                let t = step as f32 * H;
-                let at = Pose::from_parts(
-                    Vector::Y * (0.2 + speed * t),
-                    Rotation::from_scaled_axis(Vector::Y * (turn * t)),
-                );
-                world.bodies[lift].set_next_kinematic_position(at).unwrap();
-            }
-            world.step(&mut physics);
-        }
-        let [x, y, z] = world.bodies[load].center_of_mass();
-        println!("{kind:?}: {x} {y} {z}, {:?}", world.bodies[lift].pose());
-        assert!((y - (0.95)).abs() < 5e-3, "{y}");
-        // Carried round by one radian, on the same circle but for what it slips at the start.
-        assert!((x.hypot(z) - 0.2).abs() < 5e-3 && ((-z).atan2(x) - 1.0).abs() < 0.05, "{x} {z}");
-        let at = world.bodies[lift].pose();
-        assert!((at.translation.y - 0.8).abs() < 1e-5 && world.bodies[lift].elastic_energy() < before + 1e-9);
-        // What stands still is asleep, what moves is not.
-        assert!(!world.bodies[lift].is_sleeping());
-        world.bodies[lift].set_vels(Vector::ZERO, Vector::ZERO).unwrap();
-        for _ in 0..120 {
-            world.step(&mut physics);
-        }
-        assert!(world.bodies[lift].is_sleeping() && world.bodies[load].is_sleeping());
-    }
-}
-
-#[test]
-fn kinematic_bodies_follow_positions_vertex_by_vertex() {
-    let mut physics = weightless();
-    let mut world = DeformableWorld::new();
-    let body = cuboid(Vector::splat(0.2), [2; 3]).body_type(RigidBodyType::KinematicPositionBased);
-    let body = world.insert(body).unwrap();
-    let wider: Vec<Vector> = world.bodies[body].positions().map(|x| x * 1.5 + Vector::Z).collect();
-    world.bodies[body].set_next_kinematic_positions(&wider).unwrap();
-    world.step(&mut physics);
-    let off = world.bodies[body].positions().zip(&wider).map(|(a, b)| (a - *b).length()).fold(0.0, f32::max);
-    assert!(off < 1e-6, "{off}");
-    let dynamic = world.insert(cuboid(Vector::splat(0.2), [2; 3])).unwrap();
-    let dynamic = &mut world.bodies[dynamic];
-    assert_eq!(dynamic.set_next_kinematic_positions(&wider), Err(BodyError::NotKinematic));
-    let few = BodyError::WrongSize { vertices: 3, expected: 27 };
-    assert_eq!(dynamic.set_next_kinematic_positions(&wider[..3]), Err(few));
-}
-
-#[test]
-fn pins_move_on_with_their_velocity() {
-    let mut physics = weightless();
-    let mut world = DeformableWorld::new();
-    let bar = cuboid(Vector::new(0.3, 0.05, 0.05), [6, 1, 1]).pinned(|x| x.x > 0.29);
-    let bar = world.insert(bar).unwrap();
-    let held: Vec<usize> = world.bodies[bar].pinned().collect();
-    held.iter().for_each(|&v| world.bodies[bar].set_pin_velocity(v, Vector::X * 0.005).unwrap());
-    for _ in 0..240 {
-        world.step(&mut physics);
-    }
-    let x = world.bodies[bar].position(held[0]).unwrap()[0];
-    assert!((x - (0.3 + 0.005 * 240.0 * f64::from(H))).abs() < 1e-7, "{x}");
-    assert!(!world.bodies[bar].is_sleeping(), "slower than the threshold, and led all the same");
-    held.iter().for_each(|&v| world.bodies[bar].set_pin_velocity(v, Vector::ZERO).unwrap());
-    for _ in 0..240 {
-        world.step(&mut physics);
-    }
-    assert!(world.bodies[bar].is_sleeping());
-    let free = (0..world.bodies[bar].vertex_count()).find(|v| !held.contains(v)).unwrap();
-    let refused = world.bodies[bar].set_pin_velocity(free, Vector::X);
-    assert_eq!(refused, Err(BodyError::NotPinned { vertex: free }));
-}
-
-/// ρ/2 C A v², of a plate across the wind and along it, a cube, and a rod.
-#[test]
-fn wind_pushes_as_plates_and_cylinders_are_pushed() {
-    let push = |builder: DeformableBodyBuilder, wind: DeformableWind| {
-        let mut physics = weightless();
-        let mut world = DeformableWorld::new();
-        let body = world.insert(builder.pinned(|_| true)).unwrap();
-        world.bodies[body].set_wind(Some(wind)).unwrap();
-        world.step(&mut physics);
-        world.bodies[body].pin_force().map(|f| -f)
-    };
-    let wind =
-        DeformableWind { velocity: Vector::new(0.0, 0.0, 8.0), density: 1.2, drag: 1.2, friction: 0.01 };
-    let pressure = 0.5 * 1.2 * 64.0;
-    // In the plane of x and z, half a millimetre of 1000 kg/m³; turned, it is across the wind.
-    let sheet = || DeformableBodyBuilder::cloth([0.5, 0.4], [5, 4], 5.0e-4);
-    let across = push(sheet().rotation(Vector::X * std::f32::consts::FRAC_PI_2), wind);
-    let along = push(sheet(), wind);
-    let cube = push(cuboid(Vector::splat(0.2), [3; 3]), wind);
-    let rod = push(DeformableBodyBuilder::rope(&[Vector::ZERO, Vector::X, Vector::X * 2.0], 0.02), wind);
-    println!("{across:?} {along:?} {cube:?} {rod:?}");
-    let is = |force: [f64; 3], expected: f64, by: f64| {
-        assert!(near(force, [0.0, 0.0, expected], by * expected), "{force:?} {expected}");
-    };
-    is(across, pressure * 1.2 * 0.8, 1e-5);
-    is(along, pressure * 0.01 * 0.8, 1e-5);
-    // The face ahead is pushed, those beside are rubbed.
-    is(cube, pressure * 0.16 * (1.2 + 4.0 * 0.01), 1e-5);
-    is(rod, pressure * 1.2 * 2.0 * 0.04, 1e-5);
-}
-
-#[test]
-fn a_falling_sheet_comes_to_its_terminal_velocity() {
-    for h in [H, 0.1, 0.001] {
-        let mut physics = PhysicsWorld::new();
-        physics.integration_parameters.dt = h;
-        let mut world = DeformableWorld::new();
-        let sheet = DeformableBodyBuilder::cloth([0.5, 0.5], [4, 4], 1.0e-3);
-        let sheet = world.insert(sheet.material(DeformableMaterial::new(1.0e6, 0.3).density(300.0))).unwrap();
-        world.bodies[sheet].set_wind(Some(DeformableWind::new(Vector::ZERO))).unwrap();
-        for _ in 0..(3.0 / h) as usize {
-            world.step(&mut physics);
-        }
-        // m g = ρ/2 C A v².
-        let terminal = (0.3 * G / (0.5 * 1.2 * 1.2)).sqrt();
-        let v = world.bodies[sheet].linvel();
-        println!("{h}: {v:?} of {terminal}");
-        assert!((v[1] / -terminal - 1.0).abs() < 2e-3, "{v:?} {terminal}");
-    }
-}
-
-#[test]
-fn a_storm_carries_the_lightest_no_faster_than_it_blows() {
-    for h in [0.1, H, 0.001] {
-        let mut physics = weightless();
-        physics.integration_parameters.dt = h;
-        let mut world = DeformableWorld::new();
-        let light = DeformableMaterial::new(1.0e6, 0.3).density(1.0);
-        let sheet = DeformableBodyBuilder::cloth([0.5, 0.5], [6, 6], 1.0e-4)
-            .rotation(Vector::X * 0.4)
-            .material(light);
-        let sheet = world.insert(sheet).unwrap();
-        world.bodies[sheet].set_wind(Some(DeformableWind::new(Vector::new(0.0, -100.0, 30.0)))).unwrap();
-        for _ in 0..60 {
-            world.step(&mut physics);
-            assert!(world.bodies[sheet].linvel().iter().map(|v| v * v).sum::<f64>().sqrt() < 106.0);
-        }
-        assert!(world.bodies[sheet].max_speed() < 300.0, "{}", world.bodies[sheet].max_speed());
-    }
-    let mut body = cuboid(Vector::splat(0.2), [2; 3]).build().unwrap();
-    let bad = DeformableWind { density: f64::NAN, ..DeformableWind::new(Vector::X) };
-    assert!(matches!(body.set_wind(Some(bad)), Err(BodyError::NotFinite { .. })));
-}
-
-#[test]
 fn handles_are_taken_apart_and_made_again() {
     let mut bodies = DeformableBodySet::new();
     let [a, b] = [0, 1].map(|_| bodies.insert(cuboid(Vector::splat(0.1), [1; 3])).unwrap());
@@ -349,4 +138,66 @@ fn handles_are_taken_apart_and_made_again() {
     assert!(matches!(bodies.get_pair_mut(a, a), (Some(_), None)));
     bodies.remove(b).unwrap();
     assert!(!bodies.contains(b) && matches!(bodies.get_pair_mut(a, b), (Some(_), None)));
+}
+
+#[test]
+fn a_rope_keeps_its_shape_and_its_pose_when_it_is_set_again() {
+    let points: Vec<Vector> = (0..10).map(|k| Vector::X * (0.1 * k as f32)).collect();
+    let mut rope = DeformableBodyBuilder::rope(&points, 0.01).build().unwrap();
+    for v in 0..10 {
+        let [x, ..] = rope.position(v).unwrap();
+        rope.set_position(v, [(3.0 * x).sin() / 3.0, (1.0 - (3.0 * x).cos()) / 3.0, 0.0]).unwrap();
+    }
+    let to =
+        Pose::from_parts(Vector::new(3.0, 1.0, 0.0), Rotation::from_scaled_axis(Vector::new(0.4, 2.0, -1.0)));
+    rope.set_pose(to).unwrap();
+    let first: Vec<Vector> = rope.positions().collect();
+    for _ in 0..5 {
+        rope.set_pose(to).unwrap();
+        let off = rope.positions().zip(&first).map(|(a, b)| (a - *b).length()).fold(0.0, f32::max);
+        assert!(off < 1e-5, "{off}");
+    }
+    assert!((rope.pose().rotation * Vector::X - to.rotation * Vector::X).length() < 1e-5);
+}
+
+/// The upper of two bodies, and a box, that were put to sleep on one that goes.
+#[test]
+fn what_lies_on_a_body_that_was_put_to_sleep_wakes_when_that_goes() {
+    for with_box in [false, true] {
+        for way in 0..3 {
+            let (mut physics, _) = world_with_floor(H);
+            let mut world = DeformableWorld::new();
+            let lower =
+                world.insert(cuboid(Vector::splat(0.1), [2; 3]).translation(Vector::Y * 0.1)).unwrap();
+            let upper = (!with_box).then(|| {
+                world.insert(cuboid(Vector::splat(0.1), [2; 3]).translation(Vector::Y * 0.3)).unwrap()
+            });
+            let on_it = RigidBodyBuilder::dynamic().translation(Vector::new(
+                0.0,
+                if with_box { 0.3 } else { 9.0 },
+                0.0,
+            ));
+            let (on_it, _) = physics.insert(on_it, ColliderBuilder::cuboid(0.1, 0.1, 0.1));
+            (0..20).for_each(|_| world.step(&mut physics));
+            world.bodies[lower].sleep();
+            upper.iter().for_each(|upper| world.bodies[*upper].sleep());
+            physics.bodies[on_it].sleep();
+            (0..20).for_each(|_| world.step(&mut physics));
+            assert!(
+                world.bodies[lower].is_sleeping() && physics.bodies[on_it].is_sleeping(),
+                "{with_box} {way}"
+            );
+            match way {
+                0 => drop(world.remove(lower)),
+                1 => world.bodies[lower].set_enabled(false),
+                _ => world.bodies[lower].teleport(Pose::from_translation(Vector::X * 3.0)).unwrap(),
+            }
+            (0..60).for_each(|_| world.step(&mut physics));
+            let height = match upper {
+                Some(upper) => world.bodies[upper].center_of_mass()[1] as f32,
+                None => physics.bodies[on_it].translation().y,
+            };
+            assert!((height - 0.1).abs() < 0.02, "{with_box} {way}: {height}");
+        }
+    }
 }

@@ -262,3 +262,26 @@ fn a_sensor_that_is_removed_or_not_asked_sees_no_more() {
     let [event] = world.collision_events() else { panic!("{:?}", world.collision_events()) };
     assert!(event.removed() && event.sensor() && event.body() == body);
 }
+
+#[test]
+fn what_is_moved_and_put_to_sleep_has_parted() {
+    for disable in [false, true] {
+        let (mut physics, floor) = world_with_floor(H);
+        let mut world = DeformableWorld::new();
+        let body = cube(0.1).translation(Vector::Y * 0.1).active_events(ActiveEvents::COLLISION_EVENTS);
+        let body = world.insert(body).unwrap();
+        (0..20).for_each(|_| world.step(&mut physics));
+        if disable {
+            physics.colliders[floor].set_enabled(false);
+        } else {
+            world.bodies[body].teleport(Pose::from_translation(Vector::Y * 5.0)).unwrap();
+        }
+        world.bodies[body].sleep();
+        let mut told = Vec::new();
+        for _ in 0..20 {
+            world.step(&mut physics);
+            told.extend_from_slice(world.collision_events());
+        }
+        assert!(matches!(told[..], [event] if event.stopped()), "{told:?}");
+    }
+}

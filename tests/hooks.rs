@@ -169,3 +169,54 @@ fn pairs_that_hooks_filter_do_not_touch() {
     let heights = [lower, upper].map(|h| world.bodies[h].center_of_mass()[1]);
     assert!(heights.iter().all(|y| (y - 0.1).abs() < 0.01), "{heights:?}");
 }
+
+/// Two rows of vertices below and above: in between a cube has no contacts, and has not passed.
+#[test]
+fn coarse_cubes_pass_one_way_platforms_too() {
+    for thickness in [0.005f32, 0.05] {
+        for h in [H, 1.0 / 240.0] {
+            for integrator in [Integrator::ImplicitEuler, Integrator::Bdf2] {
+                let (mut physics, _) = world_with_floor(h);
+                let platform = ColliderBuilder::cuboid(3.0, thickness, 3.0)
+                    .user_data(100)
+                    .active_hooks(ActiveHooks::MODIFY_SOLVER_CONTACTS);
+                physics.insert(RigidBodyBuilder::fixed().translation(Vector::Y * 1.5), platform);
+                let mut world = DeformableWorld::new();
+                let body = DeformableBodyBuilder::cuboid(Vector::splat(0.15), [2; 3])
+                    .translation(Vector::Y * 0.6)
+                    .linvel(Vector::Y * 7.0)
+                    .angvel(Vector::new(0.3, 0.2, 0.0))
+                    .tune(|settings| settings.integrator = integrator)
+                    .material(DeformableMaterial::new(1.0e5, 0.3).stiffness_damping(0.02));
+                let body = world.insert(body).unwrap();
+                let mut highest = 0.0f64;
+                for _ in 0..(4.0 / h) as usize {
+                    world.step_with_events(&mut physics, &Hooks::default(), &());
+                    highest = highest.max(world.bodies[body].center_of_mass()[1]);
+                }
+                let rests = world.bodies[body].aabb().mins.y;
+                println!("{thickness} {h} {integrator:?}: up to {highest}, rests on {rests}");
+                // 0.6 + v²/2g = 3.1 m; implicit Euler's steps fall g h/2 short of v.
+                assert!((3.0..3.12).contains(&highest), "{highest}");
+                assert!((rests - 1.5 - thickness).abs() < 5e-3, "{rests}");
+            }
+        }
+    }
+}
+
+/// Slower than what counts as still.
+#[test]
+fn slow_belts_carry_on() {
+    let (mut physics, floor) = world_with_floor(H);
+    physics.colliders[floor].user_data = 7;
+    physics.colliders[floor].set_active_hooks(ActiveHooks::MODIFY_SOLVER_CONTACTS);
+    let mut world = DeformableWorld::new();
+    let body = world.insert(cube(0.1).translation(Vector::Y * 0.1)).unwrap();
+    let hooks = Hooks { belts: BTreeMap::from([(7, Vector::X * 0.008)]) };
+    for _ in 0..600 {
+        world.step_with_events(&mut physics, &hooks, &());
+    }
+    // Less what the cube's drag of 2/s costs where it slips: nothing, it sticks.
+    let x = world.bodies[body].center_of_mass()[0];
+    assert!((x - 0.08).abs() < 2e-3, "{x}");
+}

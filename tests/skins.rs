@@ -203,3 +203,60 @@ fn geometry_is_read_in_the_order_of_the_users_vertices() {
         }
     }
 }
+
+/// Rims, hems and curved sheets, at rest: nothing is moved, and every normal is kept.
+#[test]
+fn skins_of_sheets_are_where_they_were_bound() {
+    let check = |name: &str, body: &DeformableBody, skin: &[(Vector, Vector)]| {
+        let vertices: Vec<Vector> = skin.iter().map(|(p, _)| *p).collect();
+        let normals: Vec<Vector> = skin.iter().map(|(_, n)| *n).collect();
+        let bound = DeformableSkin::bind(body.model(), &vertices, &normals).unwrap();
+        let (mut positions, mut turned) = (vertices.clone(), normals.clone());
+        bound.update(body, &mut positions, &mut turned).unwrap();
+        for i in 0..skin.len() {
+            assert!(
+                (positions[i] - vertices[i]).length() < 1e-5,
+                "{name} {i}: {} {}",
+                positions[i],
+                vertices[i]
+            );
+            assert!((turned[i] - normals[i]).length() < 1e-4, "{name} {i}: {} {}", turned[i], normals[i]);
+        }
+    };
+    let flat = DeformableBodyBuilder::cloth([0.5, 0.4], [5, 4], 0.02).build().unwrap();
+    let rim = [
+        (Vector::new(0.55, 0.0, 0.0), Vector::X),
+        (Vector::new(0.51, 0.01, 0.1), Vector::new(0.6, 0.8, 0.0)),
+        (Vector::new(0.1, 0.01, 0.1), Vector::ZERO),
+        (Vector::new(-0.3, -0.01, 0.41), -Vector::Y),
+    ];
+    check("flat", &flat, &rim);
+    // A dome of 0.5 m, and a skin 5 cm off.
+    let (vertices, triangles) = Ball::new(0.5).to_trimesh(24, 24);
+    let places = vertices.iter().map(|v| v.to_array().map(f64::from)).collect();
+    let dome = Structure::sheet(places, &triangles, 0.002).unwrap();
+    let dome = DeformableBodyBuilder::structure(&dome).build().unwrap();
+    let (outer, _) = Ball::new(0.55).to_trimesh(40, 40);
+    let outer: Vec<(Vector, Vector)> = outer.iter().map(|v| (*v, v.normalize())).collect();
+    check("dome", &dome, &outer);
+}
+
+/// However far from a solid, a vertex goes with what is nearest.
+#[test]
+fn far_vertices_go_with_the_nearest_part_and_bind_as_fast() {
+    let mut body = DeformableBodyBuilder::cuboid(Vector::new(1.0, 0.1, 0.1), [20, 2, 2]).build().unwrap();
+    let far: Vec<Vector> =
+        (0..200).map(|k| Vector::new(-1.0 + 0.01 * k as f32, 0.4 + 0.1 * (k % 30) as f32, 0.0)).collect();
+    let skin = DeformableSkin::bind(body.model(), &far, &vec![Vector::Y; 200]).unwrap();
+    // Only the half beyond x = 0 rises.
+    move_by(&mut body, |[x, y, z]| if x > 1e-9 { [x, y + 1.0, z] } else { [x, y, z] });
+    let (mut positions, mut normals) = (far.clone(), far.clone());
+    skin.update(&body, &mut positions, &mut normals).unwrap();
+    for (p, rest) in positions.iter().zip(&far).filter(|(_, rest)| rest.x < -0.11 || rest.x > 0.11) {
+        let expected = if rest.x > 0.0 { *rest + Vector::Y } else { *rest };
+        assert!((*p - expected).length() < 1e-4, "{rest} {p}");
+    }
+    let body = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [1; 3]).build().unwrap();
+    let skin = DeformableSkin::bind(body.model(), &[Vector::X * 1e15], &[Vector::X]).unwrap();
+    assert_eq!(skin.vertex_count(), 1);
+}

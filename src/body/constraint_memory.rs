@@ -1,5 +1,6 @@
 //! What contacts leave to the next step: their names, forces and geometry.
 
+use super::impact::Partner;
 use crate::math::Vec3;
 
 /// Names a constraint over several steps. The order of the variants and of their fields is the order in which
@@ -132,6 +133,15 @@ pub(crate) enum AttachmentDirection {
 }
 
 impl ConstraintKey {
+    /// What a body touches there, if it names a contact of one.
+    pub fn partner(&self) -> Option<Partner> {
+        match self {
+            Self::Obstacle(contact) => Some(Partner::Collider(contact.collider)),
+            Self::SoftPair(contact) => Some(Partner::Soft(contact.other)),
+            _ => None,
+        }
+    }
+
     /// Whether it names a contact between deformable bodies.
     pub fn is_soft_pair(&self) -> bool {
         matches!(self, Self::SoftPair(_))

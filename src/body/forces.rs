@@ -144,8 +144,9 @@ impl DeformableBody {
 
     /// Adds to velocities of vertices [m/s].
     fn hit(&mut self, gains: impl Iterator<Item = (usize, Vec3)>) -> Result<(), BodyError> {
-        self.wake_up();
-        self.state.history.clear();
+        if !self.takes_velocities() {
+            return Ok(());
+        }
         for (vertex, gain) in gains {
             let node = self.node(vertex)?;
             self.state.v[node] += gain;

@@ -44,6 +44,10 @@ impl DeformableBody {
         self.drive = Drive::default();
         if self.is_led() {
             self.pins = std::mem::take(&mut self.held_pins);
+            // Held where they are now, not where they were then.
+            for pin in &mut self.pins {
+                *pin = Pin::at(pin.node as usize, self.state.x[pin.node as usize]);
+            }
         }
         self.body_type = body_type;
         if self.is_led() {
@@ -89,7 +93,7 @@ impl DeformableBody {
         }
         self.wake_up();
         let model = self.model.clone();
-        self.pins.iter_mut().for_each(|pin| pin.target = to(pin.node as usize, &model));
+        self.pins.iter_mut().for_each(|pin| *pin = Pin::at(pin.node as usize, to(pin.node as usize, &model)));
         Ok(())
     }
 

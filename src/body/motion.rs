@@ -4,9 +4,16 @@ use super::body::{DeformableBody, finite, rotation};
 use super::kinematics::Drive;
 use crate::error::BodyError;
 use crate::fem::elastic_forces;
-use crate::math::{Mat3, Pose64, Vec3, inertia_about, polar::polar_rotation, solve_semidefinite, to_real};
+use crate::math::{
+    Mat3, Pose64, Vec3, inertia_about,
+    polar::{polar_rotation, signed_svd},
+    shortest_turn, solve_semidefinite, to_real,
+};
 use rapier3d::dynamics::RigidBodyType;
 use rapier3d::math::{Pose, Vector};
+
+/// Part of the longest extent below which a rest shape is a line.
+const STRAIGHT: f64 = 1.0e-9;
 
 impl DeformableBody {
     /// Mass \[kg\].
@@ -26,6 +33,9 @@ impl DeformableBody {
 
     /// Angular velocity [rad/s]: that of the rigid body with the same angular momentum and inertia.
     pub fn angvel(&self) -> [f64; 3] {
+        if self.body_type == RigidBodyType::KinematicVelocityBased {
+            return self.drive.angvel.into();
+        }
         let inertia = self.inertia_matrix();
         solve_semidefinite(&inertia, &Vec3::from(self.angular_momentum())).into()
     }
@@ -41,7 +51,8 @@ impl DeformableBody {
         inertia_about(&self.weighted_mean(&self.state.x), &self.state.x, &masses)
     }
 
-    /// Where the body is as a whole: the pose of the rest shape that fits its vertices best, by mass [Horn 1987].
+    /// Where the body is as a whole: the pose of the rest shape that fits its vertices best, by mass [Horn 1987]. How a rope
+    /// that is straight at rest is turned about itself cannot be told from its vertices; it is turned the shortest way.
     pub fn pose(&self) -> Pose {
         self.fitted_pose().to_real()
     }
@@ -49,9 +60,28 @@ impl DeformableBody {
     fn fitted_pose(&self) -> Pose64 {
         let (at_rest, x) = (&self.model.rest, &self.state.x);
         let [from, to] = [at_rest, x].map(|points| self.weighted_mean(points));
-        let spread = |n: usize| (x[n] - to) * (at_rest[n] - from).transpose() * self.model.node_volumes[n];
-        let rotation = polar_rotation(&(0..x.len()).map(spread).sum::<Mat3>());
+        let rotation = match self.axes() {
+            Some([from, to]) => shortest_turn(&from, &to),
+            None => polar_rotation(&self.spread()),
+        };
         Pose64 { rotation, translation: to - rotation * from }
+    }
+
+    /// `Σ V x Xᵀ` about the centres of mass, of nodes x and rest positions X.
+    fn spread(&self) -> Mat3 {
+        let (at_rest, x) = (&self.model.rest, &self.state.x);
+        let [from, to] = [at_rest, x].map(|points| self.weighted_mean(points));
+        let spread = |n: usize| (x[n] - to) * (at_rest[n] - from).transpose() * self.model.node_volumes[n];
+        (0..x.len()).map(spread).sum()
+    }
+
+    /// Of a rope whose rest shape is straight, its direction at rest and now: how it is turned about itself cannot be told.
+    fn axes(&self) -> Option<[Vec3; 2]> {
+        let (U, S, V) = signed_svd(&self.spread());
+        let first = S.iamax();
+        let others = (0..3).filter(|k| *k != first).map(|k| S[k].abs()).fold(0.0, f64::max);
+        let is_line = others <= STRAIGHT * S[first].abs();
+        is_line.then(|| [V.column(first).into(), U.column(first) * S[first].signum()])
     }
 
     /// Linear momentum [kg m/s].
@@ -141,7 +171,7 @@ impl DeformableBody {
     }
 
     /// Makes ready for another velocity, if that moves the body.
-    fn takes_velocities(&mut self) -> bool {
+    pub(super) fn takes_velocities(&mut self) -> bool {
         self.wake_up();
         self.state.history.clear();
         matches!(self.body_type, RigidBodyType::Dynamic | RigidBodyType::KinematicVelocityBased)
@@ -152,14 +182,15 @@ impl DeformableBody {
     /// # Errors
     /// [`BodyError::NoSuchVertex`], [`BodyError::NotFinite`].
     pub fn set_velocity(&mut self, vertex: usize, velocity: Vector) -> Result<(), BodyError> {
-        self.wake_up();
-        self.state.history.clear();
         let node = self.node(vertex)?;
-        self.state.v[node] = finite("velocity", velocity)?;
+        let velocity = finite("velocity", velocity)?;
+        if self.takes_velocities() {
+            self.state.v[node] = velocity;
+        }
         Ok(())
     }
 
-    /// Moves one vertex \[m\] without giving it a velocity.
+    /// Moves one vertex \[m\] without giving it a velocity; if it is pinned, it is so there.
     ///
     /// # Errors
     /// [`BodyError::NoSuchVertex`], [`BodyError::NotFinite`].
@@ -170,6 +201,7 @@ impl DeformableBody {
         finite("position", to_real(&position.into()))?;
         self.before.clear();
         self.state.x[node] = position.into();
+        self.move_pins_along(node);
         Ok(())
     }
 
@@ -181,8 +213,13 @@ impl DeformableBody {
     pub fn set_pose(&mut self, pose: Pose) -> Result<(), BodyError> {
         finite("translation", pose.translation)?;
         rotation("rotation", pose.rotation)?;
-        let now = self.fitted_pose();
-        self.move_by(&Pose64::from_real(&pose).compose(&now.inverse()));
+        let (mut to, now) = (Pose64::from_real(&pose), self.fitted_pose());
+        if let Some([at_rest, _]) = self.axes() {
+            // The shortest way, so that nothing is turned the second time.
+            let way = now.rotation * at_rest;
+            to.rotation = shortest_turn(&way, &(to.rotation * at_rest)) * now.rotation;
+        }
+        self.move_by(&to.compose(&now.inverse()));
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 use super::body::{DeformableBody, Pin, finite};
 use crate::error::BodyError;
 use crate::math::Vec3;
+use rapier3d::dynamics::RigidBodyType;
 use rapier3d::math::Vector;
 
 impl DeformableBody {
@@ -74,11 +75,23 @@ impl DeformableBody {
         if self.is_led() { &mut self.held_pins } else { &mut self.pins }
     }
 
-    /// The pin that leads a vertex.
+    /// The pin that its user may lead a vertex by: any vertex of a body that is led by positions.
     fn pin_of(&mut self, vertex: usize) -> Result<&mut Pin, BodyError> {
         let node = self.node(vertex)?;
-        let place = place_of(&self.pins, node).map_err(|_| BodyError::NotPinned { vertex })?;
-        Ok(&mut self.pins[place])
+        let leads = self.body_type() == RigidBodyType::KinematicPositionBased;
+        let pins = if leads { &mut self.pins } else { self.own_pins() };
+        let place = place_of(pins, node).map_err(|_| BodyError::NotPinned { vertex })?;
+        Ok(&mut pins[place])
+    }
+
+    /// Leads a pinned vertex, if it is one, to where its user has put it.
+    pub(super) fn move_pins_along(&mut self, node: usize) {
+        let x = self.state.x[node];
+        for pins in [&mut self.pins, &mut self.held_pins] {
+            if let Ok(place) = place_of(pins, node) {
+                pins[place].target = x;
+            }
+        }
     }
 }
 

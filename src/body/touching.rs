@@ -2,7 +2,7 @@
 
 use super::handle::{DeformableBodyHandle, DeformableContactPartner};
 
-/// Two things that touch. Of two deformable bodies the older handle comes first.
+/// Two things that touch. Of two deformable bodies the lower handle comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct TouchKey {

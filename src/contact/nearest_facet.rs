@@ -19,11 +19,11 @@ impl NearestFacet {
         Self { triangles: TriMesh::new(points(), triangles.to_vec()).ok(), segments: lines }
     }
 
-    /// The place of the triangle in its list that is nearest to a point.
-    pub fn triangle(&self, p: &Vec3) -> Option<usize> {
-        let (_, (triangle, _)) =
-            self.triangles.as_ref()?.project_local_point_and_get_location(to_real(p), false);
-        Some(triangle as usize)
+    /// The place of the triangle in its list that is nearest to a point, and how far it is \[m\].
+    pub fn triangle(&self, p: &Vec3) -> Option<(usize, f64)> {
+        let at = to_real(p);
+        let (foot, (triangle, _)) = self.triangles.as_ref()?.project_local_point_and_get_location(at, false);
+        Some((triangle as usize, f64::from((foot.point - at).length())))
     }
 
     /// The place of the segment.

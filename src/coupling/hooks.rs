@@ -63,7 +63,7 @@ pub struct DeformablePairFilterContext<'a> {
     pub bodies: &'a RigidBodySet,
     /// The colliders.
     pub colliders: &'a ColliderSet,
-    /// The deformable body; the older one of two.
+    /// The deformable body; of two that with the lower handle.
     pub body: DeformableBodyHandle,
     /// What it may touch.
     pub partner: DeformableContactPartner,
@@ -81,7 +81,8 @@ pub struct DeformableContactModificationContext<'a> {
     pub partner_pose: Pose,
     /// Contacts that the step will solve. What is taken out is not solved.
     pub contacts: &'a mut Vec<DeformableSolverContact>,
-    /// Kept for the pair from step to step, as long as it has contacts; zero at first.
+    /// Kept for the pair from step to step, as long as their boxes are near; zero at first. While it is not, hooks are asked
+    /// without contacts too.
     pub user_data: &'a mut u32,
 }
 
@@ -139,12 +140,23 @@ impl DeformableContactModificationContext<'_> {
     pub fn update_as_oneway_platform(&mut self, allowed_normal: Vector, allowed_angle: f32) {
         let allowed = self.partner_pose.rotation * allowed_normal;
         let is_allowed = |c: &DeformableSolverContact| c.normal.dot(allowed) >= allowed_angle.cos();
-        let all_allowed = self.contacts.iter().all(is_allowed);
+        // Contacts are where the body is near: what is on its way through has parts on the other side.
+        let top = self.contacts.iter().map(|c| c.point.dot(allowed)).fold(f32::NEG_INFINITY, f32::max);
+        let body = &self.pair.deformables[self.pair.body];
+        let lowest = top - BELOW * body.model.surface.mean_edge as f32;
+        let is_beyond = || body.state.x.iter().all(|x| to_real(x).dot(allowed) > lowest);
         *self.user_data = match *self.user_data {
-            UNKNOWN | ALLOWED if all_allowed => ALLOWED,
-            // A body that lies on it and hangs over its rim.
+            // Between two rows of its vertices a body has no contacts, and has not passed.
+            state if self.contacts.is_empty() => {
+                if state == FORBIDDEN {
+                    FORBIDDEN
+                } else {
+                    UNKNOWN
+                }
+            }
+            // What lies on it may hang over its rim.
             ALLOWED => ALLOWED,
-            FORBIDDEN if all_allowed && self.contacts.iter().all(|c| c.dist > 0.0) => ALLOWED,
+            _ if self.contacts.iter().all(is_allowed) && is_beyond() => ALLOWED,
             _ => FORBIDDEN,
         };
         if *self.user_data == FORBIDDEN {
@@ -153,6 +165,8 @@ impl DeformableContactModificationContext<'_> {
     }
 }
 
+/// Mean edges by which a vertex of what has passed a one-way platform may be below its top: it may land fast.
+const BELOW: f32 = 0.1;
 /// Of normals, by the endpoint that is the partner.
 const SIGNS: [f64; 2] = [-1.0, 1.0];
 /// Coefficients of friction that the solver takes.
@@ -226,7 +240,7 @@ impl<'a> HookedPair<'a> {
         data: &mut Vec<(Partner, u32)>,
     ) -> bool {
         let is_itself = self.partner == DeformableContactPartner::Deformable(self.body);
-        if !self.modifies() || constraints.is_empty() || is_itself {
+        if !self.modifies() || is_itself {
             return false;
         }
         let name = match self.partner {
@@ -235,6 +249,9 @@ impl<'a> HookedPair<'a> {
         };
         let kept = deformables[self.body].state.pair_data.iter().find(|(partner, _)| *partner == name);
         let mut user_data = kept.map_or(0, |(_, data)| *data);
+        if constraints.is_empty() && user_data == 0 {
+            return false;
+        }
         // The body is endpoint 0, or 1 where a node of another deformable body touches it.
         let side = |constraint: &Constraint| usize::from(constraint.endpoints[0].is_of(place));
         let point = |endpoint: &Endpoint| match (endpoint, self.partner) {
@@ -269,7 +286,8 @@ impl<'a> HookedPair<'a> {
             let step = context.h * SIGNS[side(constraint)];
             own.inspect(|contact| apply(contact, constraint, step)).is_some()
         });
-        constraints.len() < count
+        // Without contacts, what is noted of the pair may keep it from touching.
+        constraints.len() < count || count == 0 && user_data != 0
     }
 }
 

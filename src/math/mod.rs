@@ -151,6 +151,12 @@ pub(crate) fn rotation_from_vector(w: &Vec3) -> Mat3 {
     nalgebra::Rotation3::new(*w).into_inner()
 }
 
+/// The rotation by the least angle that turns one direction to another.
+pub(crate) fn shortest_turn(from: &Vec3, to: &Vec3) -> Mat3 {
+    let half = || rotation_from_vector(&(tangents(from)[0] * std::f64::consts::PI));
+    nalgebra::Rotation3::rotation_between(from, to).map_or_else(half, nalgebra::Rotation3::into_inner)
+}
+
 /// Rotation vector \[rad\] of a rotation. By its quaternion: the cosine of the trace knows angles to 1.5e-8 only, and is NaN
 /// where rounding takes it past one.
 pub(crate) fn rotation_vector(R: &Mat3) -> Vec3 {

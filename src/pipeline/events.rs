@@ -7,8 +7,8 @@ use rapier3d::math::{Real, Vector};
 use rapier3d::pipeline::{ChannelEventCollector, EventHandler};
 use std::sync::mpsc::Sender;
 
-/// A deformable body and something else start or stop touching: rapier's `CollisionEvent`. Of two deformable bodies the
-/// older one is named first. With [`ActiveEvents::COLLISION_EVENTS`](rapier3d::pipeline::ActiveEvents) of either side.
+/// A deformable body and something else start or stop touching: rapier's `CollisionEvent`. Of two deformable bodies
+/// that with the lower handle is named first. With [`ActiveEvents::COLLISION_EVENTS`](rapier3d::pipeline::ActiveEvents) of either side.
 ///
 /// What carries a force touches; it stops when no contact is nearer than a hundredth of the body's edges. A sensor sees
 /// a body from the step on in which it begins to overlap. Every start has its stop.
@@ -65,7 +65,7 @@ impl DeformableCollisionEvent {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DeformableContactForceEvent {
-    /// The deformable body; the older one of two.
+    /// The deformable body; of two that with the lower handle.
     pub body: DeformableBodyHandle,
     /// What it touches.
     pub partner: DeformableContactPartner,

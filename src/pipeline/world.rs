@@ -124,7 +124,8 @@ impl DeformableWorld {
         self.pipeline.contact_force_events()
     }
 
-    /// Contacts of the last step; of sleeping bodies those with which they fell asleep.
+    /// Contacts of the last step; of sleeping bodies those with which they fell asleep, but for worlds that were loaded or
+    /// cloned since.
     ///
     /// ```
     /// use foible3d::prelude::*;

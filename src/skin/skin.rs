@@ -45,7 +45,7 @@ const CHUNK: usize = 1024;
 
 impl DeformableSkin {
     /// Binds `vertices` \[m\] with unit `normals`, in the frame of the rest shape. A vertex whose normal is zero gets none.
-    /// Takes 2 µs per vertex.
+    /// Takes some µs per vertex.
     ///
     /// # Errors
     /// [`BodyError::WrongSize`] if there are not as many normals as vertices, [`BodyError::NotFinite`].
@@ -70,14 +70,14 @@ impl DeformableSkin {
         }
         let sheets = &model.surface.triangles[model.surface.closed..];
         let normals_at_rest = sheet_normals(model, &model.rest);
-        let mut grid = (!model.tetrahedra.is_empty()).then(|| TetGrid::new(model));
+        let grid = (!model.tetrahedra.is_empty()).then(|| TetGrid::new(model));
         let ends = segments.iter().map(|(ends, ..)| *ends).collect();
         let nearest = NearestFacet::new(&model.rest, sheets, ends);
         for (p, normal) in vertices.iter().zip(normals) {
             let (p, normal) = (from_real(*p), from_real(*normal));
-            let solid = grid.as_mut().and_then(|grid| grid.nearest(&p));
+            let solid = grid.as_ref().and_then(|grid| grid.nearest(&p));
             let sheet = nearest.triangle(&p);
-            let sheet = sheet.map(|t| bind_to_triangle(model, sheets[t], &normals_at_rest, &p, &normal));
+            let sheet = sheet.map(|(t, _)| bind_to_triangle(model, sheets[t], &normals_at_rest, &p, &normal));
             let rod = nearest.segment(&p).map(|i| segments[i]);
             let rod = rod.map(|(ends, i, frame)| bind_to_segment(model, (ends, i, &frame), &p, &normal));
             let thin = sheet.into_iter().chain(rod).min_by(|a, b| a.0.total_cmp(&b.0));
@@ -103,7 +103,7 @@ impl DeformableSkin {
     /// Writes where the vertices are \[m\] and their unit normals; on several threads if there are many.
     ///
     /// # Errors
-    /// [`BodyError::WrongSize`] for a body of another model, or buffers of another length.
+    /// [`BodyError::WrongSize`] for a body of another number of vertices, or buffers of another length.
     pub fn update(
         &self,
         body: &DeformableBody,

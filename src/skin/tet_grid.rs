@@ -1,33 +1,37 @@
-//! Which tetrahedron holds a point of the rest shape, or is nearest to doing so.
+//! Which tetrahedron holds a point of the rest shape, or is nearest.
 
+use crate::contact::NearestFacet;
 use crate::fem::DeformableModel;
 use crate::math::{Mat3, Vec3};
 use std::collections::HashMap;
 
-/// Mean edges along a cell of the grid.
+/// Mean extents of the boxes of tetrahedra along a cell of the grid.
 const CELL: f64 = 1.0;
-/// Cells around that of a point in which a tetrahedron is looked for before all of them are looked at.
-const RINGS: i64 = 2;
 
-/// Tetrahedra by the cells of a grid that their boxes overlap.
+/// Tetrahedra by the cells of a grid that their boxes overlap, and by their faces on the surface.
 pub(super) struct TetGrid<'a> {
     model: &'a DeformableModel,
     cells: HashMap<[i64; 3], Vec<u32>>,
     /// Outward unit normals of the faces, and their distances from the origin \[m\].
     faces: Vec<[(Vec3, f64); 4]>,
-    /// The number of the search in which a tetrahedron was looked at last, and of the present one.
-    seen: Vec<u64>,
-    searches: u64,
     size: f64,
+    surface: NearestFacet,
+    /// The tetrahedron behind each triangle of the surface.
+    behind: Vec<u32>,
 }
 
 impl<'a> TetGrid<'a> {
     pub fn new(model: &'a DeformableModel) -> Self {
-        let size = CELL * model.surface.mean_edge;
+        let corners = |tet: &[u32; 4]| tet.map(|n| model.rest[n as usize]);
+        let extents = model.tetrahedra.iter().map(|tet| {
+            let [a, b, c, d] = corners(tet);
+            (a.sup(&b).sup(&c).sup(&d) - a.inf(&b).inf(&c).inf(&d)).amax()
+        });
+        let size = CELL * extents.sum::<f64>() / model.tetrahedra.len() as f64;
         let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
         let mut faces = Vec::with_capacity(model.tetrahedra.len());
         for (tet, nodes) in (0..).zip(&model.tetrahedra) {
-            let [a, b, c, d] = nodes.map(|n| model.rest[n as usize]);
+            let [a, b, c, d] = corners(nodes);
             let face = |p: Vec3, q: Vec3, r: Vec3| {
                 let normal = (q - p).cross(&(r - p)).try_normalize(0.0).unwrap_or_default();
                 (normal, normal.dot(&p))
@@ -41,45 +45,22 @@ impl<'a> TetGrid<'a> {
                 }
             }
         }
-        let seen = vec![0; faces.len()];
-        Self { model, cells, faces, seen, searches: 0, size }
+        let triangles = &model.surface.triangles[..model.surface.closed];
+        let surface = NearestFacet::new(&model.rest, triangles, Vec::new());
+        Self { model, cells, faces, size, surface, behind: behind(model, triangles) }
     }
 
-    /// How far a point is outside of a tetrahedron \[m\]: by the most that it is beyond a face.
-    fn outside(&self, tet: u32, p: &Vec3) -> f64 {
-        let beyond = self.faces[tet as usize].iter().map(|(normal, distance)| normal.dot(p) - distance);
-        beyond.fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// The tetrahedron that a point is in, or least outside of, and by how much \[m\].
-    pub fn nearest(&mut self, p: &Vec3) -> Option<(f64, u32)> {
-        let [x, y, z] = [p.x, p.y, p.z].map(|c| (c / self.size).floor() as i64);
-        let walls = p.map(|c| (c / self.size).fract().abs()).map(|part| part.min(1.0 - part));
-        let wall = self.size * walls.min();
-        let mut best: Option<(f64, u32)> = None;
-        self.searches += 1;
-        for ring in 0..=RINGS {
-            for i in -ring..=ring {
-                for j in -ring..=ring {
-                    for k in (-ring..=ring).filter(|k| [i, j, *k].iter().any(|c| c.abs() == ring)) {
-                        for &tet in self.cells.get(&[x + i, y + j, z + k]).into_iter().flatten() {
-                            if std::mem::replace(&mut self.seen[tet as usize], self.searches) != self.searches
-                            {
-                                keep(&mut best, (self.outside(tet, p), tet));
-                            }
-                        }
-                    }
-                }
-            }
-            // What is farther than the cells looked at is no nearer.
-            if best.is_some_and(|(outside, _)| outside <= wall + ring as f64 * self.size) {
-                break;
-            }
+    /// The tetrahedron that holds a point, or is behind the nearest triangle of the surface; and how far that is \[m\].
+    pub fn nearest(&self, p: &Vec3) -> Option<(f64, u32)> {
+        let cell = [p.x, p.y, p.z].map(|c| (c / self.size).floor() as i64);
+        let holds = |tet: &&u32| {
+            self.faces[**tet as usize].iter().all(|(normal, distance)| normal.dot(p) <= *distance)
+        };
+        if let Some(tet) = self.cells.get(&cell).and_then(|own| own.iter().find(holds)) {
+            return Some((0.0, *tet));
         }
-        if best.is_none() {
-            (0..self.faces.len() as u32).for_each(|tet| keep(&mut best, (self.outside(tet, p), tet)));
-        }
-        best
+        let (triangle, distance) = self.surface.triangle(p)?;
+        Some((distance, self.behind[triangle]))
     }
 
     /// Nodes of a tetrahedron, and what makes weights of its other corners of the way from the first.
@@ -92,8 +73,16 @@ impl<'a> TetGrid<'a> {
     }
 }
 
-fn keep(best: &mut Option<(f64, u32)>, other: (f64, u32)) {
-    if best.is_none_or(|best| other < best) {
-        *best = Some(other);
+fn behind(model: &DeformableModel, triangles: &[[u32; 3]]) -> Vec<u32> {
+    let sorted = |mut face: [u32; 3]| {
+        face.sort_unstable();
+        face
+    };
+    let mut of_face = HashMap::new();
+    for (tet, &[a, b, c, d]) in (0..).zip(&model.tetrahedra) {
+        for face in [[b, c, d], [a, c, d], [a, b, d], [a, b, c]] {
+            of_face.insert(sorted(face), tet);
+        }
     }
+    triangles.iter().map(|t| of_face.get(&sorted(*t)).copied().unwrap_or(0)).collect()
 }

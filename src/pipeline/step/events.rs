@@ -2,10 +2,11 @@
 
 use super::scratch::StepScratch;
 use crate::body::{
-    DeformableBody, DeformableBodyHandle, DeformableBodySet, DeformableContactPartner as Partner, TouchKey,
+    DeformableBody, DeformableBodyHandle, DeformableBodySet, DeformableContactPartner as Partner,
+    Partner as ConstraintPartner, TouchKey,
 };
 use crate::contact::overlaps;
-use crate::coupling::{HookedPair, StepContext, pose_of};
+use crate::coupling::{HookedPair, StepContext, packed, pose_of};
 use crate::pipeline::{
     DeformableCollisionEvent, DeformableContact, DeformableContactForceEvent, DeformablePairContact,
 };
@@ -81,7 +82,7 @@ impl StepScratch {
                 touch.is_told = true;
                 self.collision_events.push(started(&pair.key));
             }
-            let is_above = carries && pair.magnitude >= wanted.threshold;
+            let is_above = pair.magnitude > wanted.threshold;
             if is_above && !wanted.is_asleep {
                 self.contact_force_events.push(force_event(pair, !touch.was_above));
             }
@@ -152,12 +153,7 @@ impl Touching {
             if key.is_sensor {
                 return sensed.binary_search(key).is_ok();
             }
-            let sleeps = |body: &DeformableBody| body.is_enabled() && body.is_sleeping();
-            let partner_stays = match key.partner {
-                Partner::Collider(handle) => colliders.contains(handle),
-                Partner::Deformable(handle) => deformables.get(handle).is_some_and(sleeps),
-            };
-            if partner_stays && deformables.get(key.body).is_some_and(sleeps) {
+            if sleeps_with(deformables, colliders, key) {
                 return true;
             }
             let place = pairs.binary_search_by_key(key, |pair| pair.key);
@@ -165,6 +161,28 @@ impl Touching {
         };
         self.gone.clear();
         self.gone.extend(deformables.touching.keys().filter(|key| !stays(key)));
+    }
+}
+
+/// Whether a body sleeps touching the partner, by what it remembers of its contacts.
+fn sleeps_with(deformables: &DeformableBodySet, colliders: &ColliderSet, key: &TouchKey) -> bool {
+    let asleep = |handle| {
+        deformables.get(handle).filter(|body: &&DeformableBody| body.is_enabled() && body.is_sleeping())
+    };
+    let Some(body) = asleep(key.body) else { return false };
+    let remembers = |body: &DeformableBody, name: ConstraintPartner| {
+        body.state.contacts.iter().any(|memory| memory.key.partner() == Some(name))
+    };
+    match key.partner {
+        Partner::Collider(handle) => {
+            let name = ConstraintPartner::Collider(packed(handle.into_raw_parts()));
+            colliders.get(handle).is_some_and(|c| c.is_enabled()) && remembers(body, name)
+        }
+        Partner::Deformable(handle) => asleep(handle).is_some_and(|other| {
+            let [own, others] =
+                [key.body, handle].map(|h| ConstraintPartner::Soft(packed(h.into_raw_parts())));
+            remembers(body, others) || remembers(other, own)
+        }),
     }
 }
 

@@ -6,6 +6,7 @@ use crate::coupling::{DeformableHooks, PhysicsParts, StepContext};
 use crate::math::from_real;
 use crate::pipeline::{DeformableCounters, DeformableParameters};
 use crate::profiler::Stopwatch;
+use rapier3d::geometry::ColliderSet;
 
 impl StepScratch {
     /// Steps all bodies and hands rapier what they do to its bodies.
@@ -55,7 +56,7 @@ impl StepScratch {
         self.predict(deformables, context, limits.recovery_speed * context.h);
         self.detect(deformables, context, 0);
         self.detect_soft_pairs(deformables, context);
-        self.keep_contacts_of_sleepers(deformables);
+        self.keep_contacts_of_sleepers(deformables, context.sets.colliders);
         self.attach(deformables, context);
         self.walk_neighbourhood(context, parameters.neighbourhood_bodies);
         self.counters.detection_time = clock.lap();
@@ -73,9 +74,18 @@ impl StepScratch {
     }
 
     /// What touches a sleeping body goes on to do so.
-    fn keep_contacts_of_sleepers(&mut self, deformables: &DeformableBodySet) {
-        let sleeps = |body| deformables.get(body).is_some_and(DeformableBody::is_sleeping);
-        self.contacts.retain(|c| sleeps(c.body));
-        self.pair_contacts.retain(|c| sleeps(c.body1) && sleeps(c.body2));
+    fn keep_contacts_of_sleepers(&mut self, deformables: &DeformableBodySet, colliders: &ColliderSet) {
+        // What was moved before it was put to sleep remembers none.
+        let touches = |body: &DeformableBody| body.is_sleeping() && !body.state.contacts.is_empty();
+        let sleeps = |body| deformables.get(body).is_some_and(touches);
+        let either = |one, other| {
+            [one, other]
+                .into_iter()
+                .all(|body| deformables.get(body).is_some_and(DeformableBody::is_sleeping))
+                && (sleeps(one) || sleeps(other))
+        };
+        let is_there = |collider| colliders.get(collider).is_some_and(|c| c.is_enabled());
+        self.contacts.retain(|c| sleeps(c.body) && is_there(c.collider));
+        self.pair_contacts.retain(|c| either(c.body1, c.body2));
     }
 }

@@ -1,9 +1,9 @@
 //! Who sleeps and who wakes.
 
 use super::work::IslandWork;
-use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Surroundings};
+use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Partner, Surroundings};
 use crate::contact::{Candidates, Law};
-use crate::coupling::{RapierScene, RapierSets, StepContext};
+use crate::coupling::{RapierScene, RapierSets, StepContext, collider_handle, packed};
 use crate::math::{Pose64, Vec3};
 use crate::solver::ContactResult;
 use rapier3d::dynamics::{RigidBody, RigidBodyHandle};
@@ -92,13 +92,7 @@ impl Sleeping {
         context: &StepContext<'_>,
     ) {
         let around = LookAround { scene, candidates, context };
-        for (_, body) in
-            deformables.iter_mut().filter(|(_, body)| body.is_enabled() && body.is_asked_to_sleep())
-        {
-            self.look_around(body, &around);
-            (self.now.mate, self.now.rigid) = (None, Vec::new());
-            body.fall_asleep(self.now.clone());
-        }
+        self.put_to_sleep(deformables, &around);
         self.wake_attached(deformables, context.sets);
         for (_, body) in deformables.iter_mut().filter(|(_, body)| body.is_enabled() && body.is_sleeping()) {
             self.look_around(body, &around);
@@ -108,6 +102,43 @@ impl Sleeping {
             }
         }
         self.wake_together(deformables);
+    }
+
+    /// Lets bodies fall asleep whose users have put them to sleep, with what they touched that sleeps too: what carries them
+    /// wakes them when it goes.
+    fn put_to_sleep(&mut self, deformables: &mut DeformableBodySet, around: &LookAround<'_>) {
+        let asked = deformables.iter().filter(|(_, body)| body.is_enabled() && body.is_asked_to_sleep());
+        let asked: Vec<DeformableBodyHandle> = asked.map(|(handle, _)| handle).collect();
+        for handle in asked {
+            let name = |handle: DeformableBodyHandle| Partner::Soft(packed(handle.into_raw_parts()));
+            let touches = |body: &DeformableBody, partner: Partner| {
+                body.state
+                    .contacts
+                    .iter()
+                    .any(|c| c.force != Vec3::zeros() && c.key.partner() == Some(partner))
+            };
+            let own = &deformables[handle];
+            let mate = deformables.iter().find(|(other, body)| {
+                *other != handle
+                    && body.is_sleeping()
+                    && (touches(body, name(handle)) || touches(own, name(*other)))
+            });
+            let mate = mate.map(|(other, _)| other);
+            let sets = around.context.sets;
+            let rigid = own.state.contacts.iter().filter_map(|c| match c.key.partner()? {
+                Partner::Collider(collider) => sets.colliders.get(collider_handle(collider))?.parent(),
+                Partner::Soft(_) => None,
+            });
+            let is_asleep = |handle: &RigidBodyHandle| {
+                sets.bodies.get(*handle).is_some_and(|body| body.is_dynamic() && body.is_sleeping())
+            };
+            let mut rigid: Vec<RigidBodyHandle> = rigid.filter(is_asleep).collect();
+            rigid.dedup();
+            let body = &mut deformables[handle];
+            self.look_around(body, around);
+            (self.now.mate, self.now.rigid) = (mate, rigid);
+            body.fall_asleep(self.now.clone());
+        }
     }
 
     fn look_around(&mut self, body: &DeformableBody, around: &LookAround<'_>) {
@@ -132,6 +163,10 @@ impl Sleeping {
         let LookAround { scene, context, .. } = around;
         let rested = |h: &DeformableBodyHandle| deformables.get(*h).is_some_and(DeformableBody::has_rested);
         if !handles.iter().all(rested) {
+            return;
+        }
+        // What a belt carries moves on, however slowly.
+        if island.island.contacts.results().any(|c| c.constraint.surface_motion != Vec3::zeros()) {
             return;
         }
         let first = self.rigid.len();
