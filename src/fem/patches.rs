@@ -158,6 +158,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(debug_assertions, ignore = "filling checks its mesh after every change there")]
     fn patches_of_any_mesh_hang_together_and_none_is_small() {
         let shape: &dyn Shape = &Ball::new(0.5);
         let mesh = TetMesh::fill_shape(shape, 0.12).unwrap();
