@@ -108,7 +108,7 @@ pub use pipeline::{
 };
 #[cfg(feature = "debug-render")]
 pub use pipeline::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};
-pub use skin::DeformableSkin;
+pub use skin::{DeformableSkin, DeformableSurfaceMesh};
 
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
 pub mod prelude {
@@ -119,9 +119,10 @@ pub mod prelude {
         DeformableContactForceEvent, DeformableContactModificationContext, DeformableContactPartner,
         DeformableCounters, DeformableEventHandler, DeformableHooks, DeformableMaterial, DeformableModel,
         DeformablePairContact, DeformablePairFilterContext, DeformableParameters, DeformablePipeline,
-        DeformableSkin, DeformableSolverContact, DeformableSurfacePoint, DeformableWind, DeformableWorld,
-        Elasticity, FactorPrecision, Fidelity, Frames, Integrator, JointForce, JointRole, PhysicsParts,
-        RigidContact, SolvedJoint, Solver, SolverSettings, Structure, SystemMatrix, TetMesh,
+        DeformableSkin, DeformableSolverContact, DeformableSurfaceMesh, DeformableSurfacePoint,
+        DeformableWind, DeformableWorld, Elasticity, FactorPrecision, Fidelity, Frames, Integrator,
+        JointForce, JointRole, PhysicsParts, RigidContact, SolvedJoint, Solver, SolverSettings, Structure,
+        SystemMatrix, TetMesh,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

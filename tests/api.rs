@@ -24,12 +24,12 @@ promises! {
         Acceleration, FactorPrecision, Fidelity, Elasticity, DeformableBodyHandle, DeformableAttachment,
         DeformableAttachmentHandle, AttachTo, DeformableContact, DeformablePairContact, RigidContact, JointForce,
         JointRole, SolvedJoint, DeformableSurfacePoint, DeformableBodyError, BodyError, HandleError, MaterialError,
-        MeshError, DeformableContactPartner, DeformableWind, DeformableSkin, DeformableColliders, DeformableCollisionEvent,
+        MeshError, DeformableContactPartner, DeformableWind, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableCollisionEvent,
         DeformableContactForceEvent, DeformableChannelEventCollector, DeformableSolverContact,
         DeformablePairFilterContext<'static>, DeformableContactModificationContext<'static>;
-    is_printed: DeformableColliders, DeformableSkin, DeformableChannelEventCollector, DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody,
+    is_printed: DeformableColliders, DeformableSkin, DeformableSurfaceMesh, DeformableChannelEventCollector, DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody,
         DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh, Structure, DeformableAttachment;
-    is_cloned: DeformableSkin, DeformableWorld, DeformableBodySet, DeformableBody, DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh,
+    is_cloned: DeformableSkin, DeformableSurfaceMesh, DeformableWorld, DeformableBodySet, DeformableBody, DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh,
         Structure, DeformableAttachment, AttachTo, DeformableBodyError, MeshError;
 }
 

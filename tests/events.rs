@@ -2,17 +2,11 @@
 
 mod common;
 
+use common::games::{H, Random, cube};
 use common::world_with_floor;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 use std::collections::BTreeSet;
-
-const H: f32 = 1.0 / 60.0;
-
-fn cube(half: f32) -> DeformableBodyBuilder {
-    let rubber = DeformableMaterial::new(1.0e5, 0.3).mass_damping(2.0).friction(0.6);
-    DeformableBodyBuilder::cuboid(Vector::splat(half), [2; 3]).material(rubber)
-}
 
 /// Pairs that have started and not stopped, with a sensor or without.
 #[derive(Default)]
@@ -34,20 +28,6 @@ impl Book {
                 assert!(event.stopped() && self.open.remove(&key), "{event:?} has not started");
             }
         }
-    }
-}
-
-/// A small generator: tests take no dependency for it.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: u32) -> u32 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((self.0 >> 33) % u64::from(n)) as u32
-    }
-
-    fn unit(&mut self) -> f32 {
-        self.below(10_000) as f32 / 10_000.0
     }
 }
 

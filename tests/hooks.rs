@@ -2,17 +2,11 @@
 
 mod common;
 
+use common::games::{H, cube};
 use common::world_with_floor;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 use std::collections::BTreeMap;
-
-const H: f32 = 1.0 / 60.0;
-
-fn cube(half: f32) -> DeformableBodyBuilder {
-    let rubber = DeformableMaterial::new(1.0e5, 0.3).mass_damping(2.0).friction(0.6);
-    DeformableBodyBuilder::cuboid(Vector::splat(half), [2; 3]).material(rubber)
-}
 
 /// What hooks do in a test: belts and one-way platforms by the user data of colliders, and pairs of bodies.
 #[derive(Default)]

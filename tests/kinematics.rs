@@ -2,24 +2,11 @@
 
 mod common;
 
+use common::games::{H, cuboid, weightless};
 use common::{G, world_with_floor};
 use foible3d::BodyError;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
-
-const H: f32 = 1.0 / 60.0;
-
-fn cuboid(half: Vector, cells: [usize; 3]) -> DeformableBodyBuilder {
-    let rubber = DeformableMaterial::new(2.0e5, 0.3).mass_damping(1.0).friction(0.5);
-    DeformableBodyBuilder::cuboid(half, cells).material(rubber)
-}
-
-fn weightless() -> PhysicsWorld {
-    let mut physics = PhysicsWorld::new();
-    physics.gravity = Vector::ZERO;
-    physics.integration_parameters.dt = H;
-    physics
-}
 
 #[test]
 fn a_fixed_body_carries_and_is_let_go_as_it_was() {

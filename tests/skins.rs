@@ -260,3 +260,48 @@ fn far_vertices_go_with_the_nearest_part_and_bind_as_fast() {
     let skin = DeformableSkin::bind(body.model(), &[Vector::X * 1e15], &[Vector::X]).unwrap();
     assert_eq!(skin.vertex_count(), 1);
 }
+
+/// Volume within triangles that are wound outward \[m³\].
+fn volume(mesh: &DeformableSurfaceMesh) -> f32 {
+    let corners = |t: &[u32; 3]| t.map(|v| mesh.vertices[v as usize]);
+    mesh.triangles.iter().map(|t| corners(t)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+}
+
+#[test]
+fn surface_meshes_are_closed_and_outward() {
+    let points: Vec<Vector> =
+        (0..=20).map(|k| Vector::new(0.05 * k as f32, 0.0, (0.2 * k as f32).sin() * 0.1)).collect();
+    let rope = DeformableBodyBuilder::rope(&points, 0.02).build().unwrap();
+    let length: f32 = points.windows(2).map(|ends| (ends[1] - ends[0]).length()).sum();
+    // A polygon of ten sides has 0.935 of its circle's area; and bends cut corners.
+    let tube = 0.935 * std::f32::consts::PI * 0.02 * 0.02 * length;
+    let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.5), [3, 2, 2]).build().unwrap();
+    let ball = DeformableBodyBuilder::filled(&Ball::new(0.5), 0.125).build().unwrap();
+    let cloth = DeformableBodyBuilder::cloth([0.5, 0.4], [5, 4], 0.02).build().unwrap();
+    let inside = ball.model().volume() as f32;
+    for (body, expected, tolerance) in
+        [(rope, tube, 0.03), (cube, 1.0, 1e-5), (ball, inside, 1e-4), (cloth, 0.016, 1e-4)]
+    {
+        let mesh = DeformableSurfaceMesh::new(body.model());
+        assert!((volume(&mesh) / expected - 1.0).abs() < tolerance, "{} of {expected}", volume(&mesh));
+        for triangle in &mesh.triangles {
+            let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
+            let normal = (b - a).cross(c - a).normalize();
+            let least = triangle.iter().map(|v| mesh.normals[*v as usize].dot(normal)).fold(1.0, f32::min);
+            assert!(least > 0.7, "{least}");
+        }
+        // At rest a skin is where the mesh is.
+        let skin = DeformableSkin::bind(body.model(), &mesh.vertices, &mesh.normals).unwrap();
+        let (mut positions, mut normals) = (mesh.vertices.clone(), mesh.normals.clone());
+        skin.update(&body, &mut positions, &mut normals).unwrap();
+        for i in 0..positions.len() {
+            assert!(
+                (positions[i] - mesh.vertices[i]).length() < 1e-5,
+                "{} {}",
+                positions[i],
+                mesh.vertices[i]
+            );
+            assert!((normals[i] - mesh.normals[i]).length() < 1e-3, "{} {}", normals[i], mesh.normals[i]);
+        }
+    }
+}

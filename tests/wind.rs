@@ -3,23 +3,10 @@
 mod common;
 
 use common::G;
+use common::games::{H, cuboid, weightless};
 use foible3d::BodyError;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
-
-const H: f32 = 1.0 / 60.0;
-
-fn cuboid(half: Vector, cells: [usize; 3]) -> DeformableBodyBuilder {
-    let rubber = DeformableMaterial::new(2.0e5, 0.3).mass_damping(1.0).friction(0.5);
-    DeformableBodyBuilder::cuboid(half, cells).material(rubber)
-}
-
-fn weightless() -> PhysicsWorld {
-    let mut physics = PhysicsWorld::new();
-    physics.gravity = Vector::ZERO;
-    physics.integration_parameters.dt = H;
-    physics
-}
 
 fn near(a: [f64; 3], b: [f64; 3], by: f64) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by)

@@ -206,7 +206,7 @@ impl DeformableAttachment {
             Anchors::World(points) | Anchors::Rigid(_, points) => &points[..],
             Anchors::Deformable(..) => &[],
         };
-        let are_points = points.iter().chain([&self.force]).all(|p| p.iter().all(|c| c.is_finite()));
+        let are_points = points.iter().chain([&self.force]).all(super::snapshot::is_finite);
         are_points && self.compliance >= 0.0 && self.length >= 0.0
     }
 

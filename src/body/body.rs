@@ -11,6 +11,7 @@ use crate::error::BodyError;
 use crate::fem::{DeformableModel, Elements, volume};
 use crate::material::DeformableMaterial;
 use crate::math::{Vec3, from_real, to_real};
+use crate::mesh::point_normals;
 use parry3d::bounding_volume::Aabb;
 use rapier3d::dynamics::{CoefficientCombineRule, RigidBodyType};
 use rapier3d::geometry::InteractionGroups;
@@ -196,14 +197,8 @@ impl DeformableBody {
 
     /// Unit normals of the surface at the vertices, by the areas of the triangles around them; zero inside and on rods.
     pub fn normals(&self) -> Vec<Vector> {
-        let mut normals = vec![Vec3::zeros(); self.state.x.len()];
-        for triangle in &self.model.surface.triangles {
-            let [a, b, c] = triangle.map(|n| self.state.x[n as usize]);
-            let across = (b - a).cross(&(c - a));
-            triangle.iter().for_each(|n| normals[*n as usize] += across);
-        }
-        let unit = |n: usize| to_real(&normals[n].try_normalize(0.0).unwrap_or_default());
-        self.model.nodes_by_vertex().map(unit).collect()
+        let normals = point_normals(&self.model.surface.triangles, &self.state.x);
+        self.model.nodes_by_vertex().map(|n| to_real(&normals[n])).collect()
     }
 
     /// Position of a vertex \[m\] in the solver's precision.
@@ -246,6 +241,10 @@ impl DeformableBody {
 
     pub(crate) fn node_mass(&self, node: usize) -> f64 {
         self.material.density * self.model.node_volumes[node]
+    }
+
+    pub(super) fn node_masses(&self) -> Vec<f64> {
+        (0..self.state.x.len()).map(|node| self.node_mass(node)).collect()
     }
 
     pub(super) fn node(&self, vertex: usize) -> Result<usize, BodyError> {

@@ -5,9 +5,9 @@ use super::kinematics::Drive;
 use crate::error::BodyError;
 use crate::fem::elastic_forces;
 use crate::math::{
-    Mat3, Pose64, Vec3, inertia_about,
+    Mat3, Pose64, RigidMotion, Vec3, inertia_about,
     polar::{polar_rotation, signed_svd},
-    shortest_turn, solve_semidefinite, to_real,
+    shortest_turn, to_real,
 };
 use rapier3d::dynamics::RigidBodyType;
 use rapier3d::math::{Pose, Vector};
@@ -36,19 +36,14 @@ impl DeformableBody {
         if self.body_type == RigidBodyType::KinematicVelocityBased {
             return self.drive.angvel.into();
         }
-        let inertia = self.inertia_matrix();
-        solve_semidefinite(&inertia, &Vec3::from(self.angular_momentum())).into()
+        RigidMotion::of(&self.state.x, &self.state.v, &self.node_masses()).spin.into()
     }
 
     /// Inertia about the centre of mass as the body is now, row by row [kg m²].
     pub fn inertia(&self) -> [[f64; 3]; 3] {
+        let centre = self.weighted_mean(&self.state.x);
         // Symmetric: rows are columns.
-        self.inertia_matrix().into()
-    }
-
-    fn inertia_matrix(&self) -> Mat3 {
-        let masses: Vec<f64> = (0..self.state.x.len()).map(|node| self.node_mass(node)).collect();
-        inertia_about(&self.weighted_mean(&self.state.x), &self.state.x, &masses)
+        inertia_about(&centre, &self.state.x, &self.node_masses()).into()
     }
 
     /// Where the body is as a whole: the pose of the rest shape that fits its vertices best, by mass [Horn 1987]. How a rope

@@ -78,21 +78,18 @@ impl<T> Slots<T> {
     /// Two values at once; of one slot there is one at the most.
     pub fn get2_mut(&mut self, first: Index, second: Index) -> (Option<&mut T>, Option<&mut T>) {
         let ((i, of_first), (j, of_second)) = (first.into_raw_parts(), second.into_raw_parts());
-        if i == j {
+        if i == j || i.max(j) as usize >= self.slots.len() {
+            // One slot, or one that is none.
             return if self.get(first).is_some() {
                 (self.get_mut(first), None)
             } else {
                 (None, self.get_mut(second))
             };
         }
-        let (low, high) = (i.min(j) as usize, i.max(j) as usize);
-        if high >= self.slots.len() {
-            return if i < j { (self.get_mut(first), None) } else { (None, self.get_mut(second)) };
+        match self.slots.get_disjoint_mut([i as usize, j as usize]) {
+            Ok([a, b]) => (a.value_of(of_first), b.value_of(of_second)),
+            Err(_) => (None, None),
         }
-        let (front, back) = self.slots.split_at_mut(high);
-        let (low, high) = (&mut front[low], &mut back[0]);
-        let (a, b) = if i < j { (low, high) } else { (high, low) };
-        (a.value_of(of_first), b.value_of(of_second))
     }
 
     pub fn iter(&self) -> impl Iterator<Item = (Index, &T)> {

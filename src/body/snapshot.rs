@@ -246,6 +246,6 @@ impl DeformableBody {
     }
 }
 
-fn is_finite(v: &Vec3) -> bool {
+pub(super) fn is_finite(v: &Vec3) -> bool {
     v.iter().all(|c| c.is_finite())
 }

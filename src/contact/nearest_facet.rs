@@ -5,7 +5,6 @@ use parry3d::query::PointQueryWithLocation;
 use parry3d::shape::{Polyline, TriMesh, Triangle};
 
 /// Triangles and segments to look among.
-#[derive(Default)]
 pub(crate) struct NearestFacet {
     triangles: Option<TriMesh>,
     segments: Option<Polyline>,

@@ -147,13 +147,8 @@ impl DeformableContactModificationContext<'_> {
         let is_beyond = || body.state.x.iter().all(|x| to_real(x).dot(allowed) > lowest);
         *self.user_data = match *self.user_data {
             // Between two rows of its vertices a body has no contacts, and has not passed.
-            state if self.contacts.is_empty() => {
-                if state == FORBIDDEN {
-                    FORBIDDEN
-                } else {
-                    UNKNOWN
-                }
-            }
+            FORBIDDEN if self.contacts.is_empty() => FORBIDDEN,
+            _ if self.contacts.is_empty() => UNKNOWN,
             // What lies on it may hang over its rim.
             ALLOWED => ALLOWED,
             _ if self.contacts.iter().all(is_allowed) && is_beyond() => ALLOWED,

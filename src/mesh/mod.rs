@@ -15,6 +15,6 @@ mod tet_mesh;
 pub use mesh_error::MeshError;
 pub(crate) use ordering::{node_adjacency, sweep_order};
 pub use structure::Structure;
-pub(crate) use surface::{NONE, Surface};
+pub(crate) use surface::{NONE, Surface, point_normals, sorted_face, sorted_faces};
 pub use tet_mesh::TetMesh;
 pub(crate) use tet_mesh::{signed_volume, tetrahedron_holds};

@@ -42,8 +42,8 @@ impl Surface {
         let mut triangles = boundary_triangles(tetrahedra).unwrap_or_default();
         let closed = triangles.len();
         // A skin on a solid is the solid's surface.
-        let known: HashSet<[u32; 3]> = triangles.iter().map(|t| sorted(*t)).collect();
-        triangles.extend(sheets.iter().filter(|t| !known.contains(&sorted(**t))));
+        let known: HashSet<[u32; 3]> = triangles.iter().map(|t| sorted_face(*t)).collect();
+        triangles.extend(sheets.iter().filter(|t| !known.contains(&sorted_face(**t))));
         let mut index_of_node = vec![u32::MAX; rest.len()];
         let on_surface = triangles.iter().flatten().chain(segments.iter().flatten());
         on_surface.for_each(|&n| index_of_node[n as usize] = 0);
@@ -142,12 +142,12 @@ pub(crate) fn boundary_triangles(tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32; 3]
     let faces = tetrahedra.iter().flat_map(|t| FACES.map(|f| f.map(|k| t[k])));
     let mut count: HashMap<[u32; 3], usize> = HashMap::with_capacity(2 * tetrahedra.len());
     for face in faces.clone() {
-        *count.entry(sorted(face)).or_default() += 1;
+        *count.entry(sorted_face(face)).or_default() += 1;
     }
     if let Some((face, &n)) = count.iter().filter(|(_, n)| **n > 2).min() {
         return Err((*face, n));
     }
-    Ok(faces.filter(|&f| count[&sorted(f)] == 1).collect())
+    Ok(faces.filter(|&f| count[&sorted_face(f)] == 1).collect())
 }
 
 /// An edge and the number of triangles on it.
@@ -167,7 +167,25 @@ pub(crate) fn edge_uses(triangles: &[[u32; 3]]) -> Vec<EdgeUse> {
     edges.chunk_by(|a, b| a == b).map(|run| EdgeUse { edge: run[0], count: run.len() }).collect()
 }
 
-fn sorted(mut face: [u32; 3]) -> [u32; 3] {
+/// The faces of a tetrahedron, each with its corners ascending.
+pub(crate) fn sorted_faces(tet: &[u32; 4]) -> [[u32; 3]; 4] {
+    FACES.map(|face| sorted_face(face.map(|k| tet[k])))
+}
+
+/// Unit normals at the points of triangles, by the areas of those around them; zero at other points.
+pub(crate) fn point_normals(triangles: &[[u32; 3]], points: &[Vec3]) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::zeros(); points.len()];
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|n| points[n as usize]);
+        let across = (b - a).cross(&(c - a));
+        triangle.iter().for_each(|n| normals[*n as usize] += across);
+    }
+    normals.iter_mut().for_each(|n| *n = n.try_normalize(0.0).unwrap_or_default());
+    normals
+}
+
+/// A face with its corners ascending.
+pub(crate) fn sorted_face(mut face: [u32; 3]) -> [u32; 3] {
     face.sort_unstable();
     face
 }

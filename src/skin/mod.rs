@@ -2,9 +2,11 @@
 
 mod binding;
 mod rod_frames;
+mod surface_mesh;
 mod tet_grid;
 
 #[allow(clippy::module_inception)]
 mod skin;
 
 pub use skin::DeformableSkin;
+pub use surface_mesh::DeformableSurfaceMesh;

@@ -8,6 +8,7 @@ use crate::contact::NearestFacet;
 use crate::error::BodyError;
 use crate::fem::DeformableModel;
 use crate::math::{Vec3, from_real};
+use crate::mesh::point_normals;
 use crate::threads::for_each_pair;
 use rapier3d::math::Vector;
 
@@ -69,7 +70,7 @@ impl DeformableSkin {
             skin.rods.extend(rest_frames.first().map(|frame| (nodes, *frame)));
         }
         let sheets = &model.surface.triangles[model.surface.closed..];
-        let normals_at_rest = sheet_normals(model, &model.rest);
+        let normals_at_rest = point_normals(sheets, &model.rest);
         let grid = (!model.tetrahedra.is_empty()).then(|| TetGrid::new(model));
         let ends = segments.iter().map(|(ends, ..)| *ends).collect();
         let nearest = NearestFacet::new(&model.rest, sheets, ends);
@@ -110,7 +111,7 @@ impl DeformableSkin {
         positions: &mut [Vector],
         normals: &mut [Vector],
     ) -> Result<(), BodyError> {
-        self.write(body, body.state.x.clone(), positions, normals)
+        self.write(body, &body.state.x, positions, normals)
     }
 
     /// As [`DeformableSkin::update`], between the last two steps: at `t` 0 where the last one began, at 1 where it ended. For
@@ -125,13 +126,13 @@ impl DeformableSkin {
         positions: &mut [Vector],
         normals: &mut [Vector],
     ) -> Result<(), BodyError> {
-        self.write(body, body.nodes_between(t), positions, normals)
+        self.write(body, &body.nodes_between(t), positions, normals)
     }
 
     fn write(
         &self,
         body: &DeformableBody,
-        x: Vec<Vec3>,
+        x: &[Vec3],
         positions: &mut [Vector],
         normals: &mut [Vector],
     ) -> Result<(), BodyError> {
@@ -147,7 +148,8 @@ impl DeformableSkin {
         let mut motion = Motion { origin: single(&origin), ..Motion::default() };
         motion.x.extend(x.iter().map(|x| single(&(x - origin))));
         if self.uses_sheets {
-            motion.normals.extend(sheet_normals(&body.model, &x).iter().map(single));
+            let surface = &body.model.surface;
+            motion.normals.extend(point_normals(&surface.triangles[surface.closed..], x).iter().map(single));
         }
         let mut own = Vec::new();
         for (nodes, first) in &self.rods {
@@ -166,16 +168,4 @@ impl DeformableSkin {
         });
         Ok(())
     }
-}
-
-/// Unit normals of the sheets at their nodes, by the areas of the triangles around them; zero elsewhere.
-fn sheet_normals(model: &DeformableModel, x: &[Vec3]) -> Vec<Vec3> {
-    let mut normals = vec![Vec3::zeros(); x.len()];
-    for triangle in &model.surface.triangles[model.surface.closed..] {
-        let [a, b, c] = triangle.map(|n| x[n as usize]);
-        let across = (b - a).cross(&(c - a));
-        triangle.iter().for_each(|n| normals[*n as usize] += across);
-    }
-    normals.iter_mut().for_each(|n| *n = n.try_normalize(0.0).unwrap_or_default());
-    normals
 }

@@ -75,17 +75,14 @@ impl StepScratch {
 
     /// What touches a sleeping body goes on to do so.
     fn keep_contacts_of_sleepers(&mut self, deformables: &DeformableBodySet, colliders: &ColliderSet) {
+        let asleep = |body| deformables.get(body).filter(|body| body.is_sleeping());
         // What was moved before it was put to sleep remembers none.
-        let touches = |body: &DeformableBody| body.is_sleeping() && !body.state.contacts.is_empty();
-        let sleeps = |body| deformables.get(body).is_some_and(touches);
-        let either = |one, other| {
-            [one, other]
-                .into_iter()
-                .all(|body| deformables.get(body).is_some_and(DeformableBody::is_sleeping))
-                && (sleeps(one) || sleeps(other))
-        };
+        let remembers = |body: &DeformableBody| !body.state.contacts.is_empty();
         let is_there = |collider| colliders.get(collider).is_some_and(|c| c.is_enabled());
-        self.contacts.retain(|c| sleeps(c.body) && is_there(c.collider));
-        self.pair_contacts.retain(|c| either(c.body1, c.body2));
+        self.contacts.retain(|c| asleep(c.body).is_some_and(remembers) && is_there(c.collider));
+        self.pair_contacts.retain(|c| match (asleep(c.body1), asleep(c.body2)) {
+            (Some(a), Some(b)) => remembers(a) || remembers(b),
+            _ => false,
+        });
     }
 }

@@ -19,6 +19,12 @@ const MAX_GIVEN_BACK: f64 = 1.0e-2;
 /// a block of 1e7 Pa that spins by a third of a radian a step loses 7 % of its spin in a second.
 const MAX_RIGID_GAIN: f64 = 1.0e-3;
 
+/// Energies of a step \[J\]: elastic and kinetic at its start, kinetic at its end.
+struct StepEnergy {
+    start: f64,
+    held: f64,
+}
+
 impl BodyProblem {
     /// Kinetic energy \[J\] of the nodes that are not pinned: what leads a pin gives its node the energy of its own motion.
     fn kinetic_energy<'a>(&self, v: impl Iterator<Item = &'a Vec3>) -> f64 {
@@ -42,8 +48,14 @@ impl BodyProblem {
     /// Whether so much is left of the iteration that it is worth an evaluation to know what the step has made, and it has
     /// made energy.
     pub fn gained(&mut self) -> bool {
+        if self.is_alpha() {
+            return self.gained_much(true);
+        }
         let is_solved = self.residual() <= self.settings.tolerance.max(HARMLESS) * self.force_scale();
-        if self.is_alpha() { self.gained_much(true) } else { !is_solved && self.exceeds_energy(true) }
+        !is_solved && {
+            let energy = self.measure_energy(true);
+            self.exceeds(energy.held)
+        }
     }
 
     /// Elastic and kinetic energy at the start \[J\]. Takes the trial positions' place.
@@ -73,8 +85,8 @@ impl BodyProblem {
     }
 
     /// Finds what kinetic energy \[J\] the step leaves: that of its start, elastic and kinetic, with the work of external
-    /// forces, contacts and pins, less what is elastic at its end. True if its velocities hold more.
-    fn exceeds_energy(&mut self, in_flight: bool) -> bool {
+    /// forces, contacts and pins, less what is elastic at its end. The velocities at its end are in `force` then.
+    fn measure_energy(&mut self, in_flight: bool) -> StepEnergy {
         let start = self.start_energy();
         let (x, _) = self.origin();
         let mut work = 0.0;
@@ -93,23 +105,29 @@ impl BodyProblem {
         self.unlimited_velocities(in_flight, &mut v);
         let held = self.kinetic_energy(v.iter());
         self.force = v;
-        // Written so that NaN counts as too much.
+        StepEnergy { start, held }
+    }
+
+    /// Whether velocities hold more than the step leaves; written so that NaN counts as too much.
+    fn exceeds(&self, held: f64) -> bool {
         !(held <= self.kinetic_bound)
     }
 
     /// Whether a step of generalized-α has made more energy than its velocities may give back.
     pub fn gained_much(&mut self, in_flight: bool) -> bool {
-        if !self.is_alpha() || !self.exceeds_energy(in_flight) {
+        if !self.is_alpha() {
+            return false;
+        }
+        let StepEnergy { start, held } = self.measure_energy(in_flight);
+        if !self.exceeds(held) {
             return false;
         }
         let mut v = std::mem::take(&mut self.force);
-        self.unlimited_velocities(in_flight, &mut v);
-        let held = self.kinetic_energy(v.iter());
         let rigid = self.rigid_energy(&mut v);
         self.force = v;
         let mass = self.masses.iter().sum::<f64>();
         let falls = self.weight * self.masses.len() as f64 / mass * self.dt;
-        let may_give = MAX_GIVEN_BACK * (self.start_energy() + mass * falls * falls);
+        let may_give = MAX_GIVEN_BACK * (start + mass * falls * falls);
         // Written so that NaN counts as much.
         !(held <= self.kinetic_bound + may_give && rigid <= self.kinetic_bound + MAX_RIGID_GAIN * held)
     }
@@ -138,10 +156,12 @@ impl BodyProblem {
 
     /// Rejects the step if its bound is less than what momentum asks for.
     pub fn bound_energy(&mut self) {
-        // Written so that NaN counts as less.
-        let mut v = Vec::new();
+        let mut v = std::mem::take(&mut self.force);
         self.unlimited_velocities(true, &mut v);
-        if !(self.kinetic_bound >= self.rigid_energy(&mut v)) {
+        // Written so that NaN counts as less.
+        let is_less = !(self.kinetic_bound >= self.rigid_energy(&mut v));
+        self.force = v;
+        if is_less {
             self.reject_free_step();
         }
     }
