@@ -88,8 +88,8 @@ mod pipeline;
 pub use body::{
     Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
     DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableContactPartner,
-    DeformableState, DeformableWind, FactorPrecision, Fidelity, Frames, Integrator, JointRole, Solver,
-    SolverSettings,
+    DeformableState, DeformableStress, DeformableWind, FactorPrecision, Fidelity, Frames, Integrator,
+    JointRole, Solver, SolverSettings,
 };
 pub use contact::DeformableSurfacePoint;
 pub use coupling::{
@@ -119,10 +119,10 @@ pub mod prelude {
         DeformableContactForceEvent, DeformableContactModificationContext, DeformableContactPartner,
         DeformableCounters, DeformableEventHandler, DeformableHooks, DeformableMaterial, DeformableModel,
         DeformablePairContact, DeformablePairFilterContext, DeformableParameters, DeformablePipeline,
-        DeformableSkin, DeformableSolverContact, DeformableSurfaceMesh, DeformableSurfacePoint,
-        DeformableWind, DeformableWorld, Elasticity, FactorPrecision, Fidelity, Frames, Integrator,
-        JointForce, JointRole, PhysicsParts, RigidContact, SolvedJoint, Solver, SolverSettings, Structure,
-        SystemMatrix, TetMesh,
+        DeformableSkin, DeformableSolverContact, DeformableStress, DeformableSurfaceMesh,
+        DeformableSurfacePoint, DeformableWind, DeformableWorld, Elasticity, FactorPrecision, Fidelity,
+        Frames, Integrator, JointForce, JointRole, PhysicsParts, RigidContact, SolvedJoint, Solver,
+        SolverSettings, Structure, SystemMatrix, TetMesh,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};
@@ -132,3 +132,8 @@ pub mod prelude {
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+/// So do those for games.
+#[cfg(all(doctest, feature = "serde-serialize"))]
+#[doc = include_str!("../docs/games.md")]
+struct Games;

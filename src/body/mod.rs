@@ -24,6 +24,7 @@ mod motion;
 mod pins;
 mod report;
 mod sleep;
+mod stress;
 mod wind;
 
 mod builder;
@@ -50,5 +51,6 @@ pub use set::DeformableBodySet;
 pub use settings::{Acceleration, FactorPrecision, Fidelity, Frames, Integrator, Solver, SolverSettings};
 pub use state::DeformableState;
 pub(crate) use state::{History, Surroundings, is_number};
+pub use stress::DeformableStress;
 pub(crate) use touching::TouchKey;
 pub use wind::DeformableWind;

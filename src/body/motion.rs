@@ -3,7 +3,6 @@
 use super::body::{DeformableBody, finite, rotation};
 use super::kinematics::Drive;
 use crate::error::BodyError;
-use crate::fem::elastic_forces;
 use crate::math::{
     Mat3, Pose64, RigidMotion, Vec3, inertia_about,
     polar::{polar_rotation, signed_svd},
@@ -105,12 +104,7 @@ impl DeformableBody {
 
     /// Elastic energy \[J\].
     pub fn elastic_energy(&self) -> f64 {
-        let mut unused = vec![Vec3::zeros(); self.state.x.len()];
-        let undamped = elastic_forces::StiffnessDamping::default();
-        let frame = crate::math::Mat3::identity();
-        let x = &self.state.x;
-        let at = elastic_forces::Evaluation { damping: &undamped, x, frame: &frame, limit: f64::INFINITY };
-        elastic_forces::add_forces(&self.elements(), &at, &mut unused).energy
+        self.elastic_response().0
     }
 
     /// Sets the velocity of the centre of mass [m/s]; the body goes on turning and vibrating. Not of one that is fixed or led

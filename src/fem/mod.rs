@@ -14,6 +14,7 @@ mod model_file;
 mod gradients;
 
 pub(crate) mod elastic_forces;
+mod stresses;
 mod thin_elements;
 
 mod frames;
@@ -25,4 +26,5 @@ pub use constant_matrix::SystemMatrix;
 pub(crate) use frames::{floating_frame, node_rotations, volume};
 pub use model::DeformableModel;
 pub(crate) use model::{Build, Elements};
+pub(crate) use stresses::{ElementState, element_states};
 pub(crate) use tangents::add_tangents;

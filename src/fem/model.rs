@@ -48,7 +48,7 @@ pub struct DeformableModel {
     /// Volume at rest \[m³\].
     pub(crate) volume: f64,
     node_of_vertex: Vec<u32>,
-    vertex_of_node: Vec<u32>,
+    pub(crate) vertex_of_node: Vec<u32>,
     /// What it was made of.
     pub(super) structure: Arc<Structure>,
     /// Tetrahedra with muscle fibres, and their unit directions.

@@ -21,6 +21,10 @@ pub struct DeformableContact {
     pub force: Vector,
     /// Distance along the normal at the end of the step \[m\]; negative is penetration.
     pub gap: f64,
+    /// Vertices of the body that the force acts on.
+    pub vertices: [usize; 3],
+    /// Their shares of it; they sum to one.
+    pub weights: [f64; 3],
 }
 
 /// A point where two deformable bodies touched in the last step, or one touched itself.
@@ -39,6 +43,10 @@ pub struct DeformablePairContact {
     pub force: Vector,
     /// Distance along the normal at the end of the step \[m\]; negative is penetration.
     pub gap: f64,
+    /// Vertices of the first body that the force acts on, and of the second.
+    pub vertices: [[usize; 3]; 2],
+    /// Their shares of it; they sum to one for each body.
+    pub weights: [[f64; 3]; 2],
 }
 
 /// A contact between two rigid bodies that the last step solved, because one of them is touched by a

@@ -183,6 +183,31 @@ impl DeformableWorld {
         forces.sum()
     }
 
+    /// Force per area \[Pa\] of all contacts of the last step on each vertex of a body, those with deformable bodies and itself
+    /// included: times [`DeformableBody::vertex_areas`] it sums to the contact forces. Zero at vertices without a surface.
+    ///
+    /// # Errors
+    /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody).
+    pub fn contact_tractions(&self, body: DeformableBodyHandle) -> Result<Vec<Vector>, DeformableBodyError> {
+        let areas = self.bodies.get(body).ok_or_else(|| body.no_such_body())?.vertex_areas();
+        let mut tractions = vec![Vector::ZERO; areas.len()];
+        let mut add = |vertices: &[usize; 3], weights: &[f64; 3], force: Vector| {
+            for (vertex, weight) in vertices.iter().zip(weights) {
+                if areas[*vertex] > 0.0 {
+                    tractions[*vertex] += force * (weight / areas[*vertex]) as f32;
+                }
+            }
+        };
+        self.contacts_of(body).for_each(|c| add(&c.vertices, &c.weights, c.force));
+        for contact in self.pair_contacts() {
+            let ends = [(contact.body1, contact.force), (contact.body2, -contact.force)];
+            for (side, (_, force)) in ends.into_iter().enumerate().filter(|(_, (of, _))| *of == body) {
+                add(&contact.vertices[side], &contact.weights[side], force);
+            }
+        }
+        Ok(tractions)
+    }
+
     /// Contacts between rigid bodies that the last step solved: of those that deformables touch, or that
     /// hold such. What rapier's own contacts show is their remainder.
     pub fn rigid_contacts(&self) -> &[RigidContact] {

@@ -3,6 +3,7 @@
 use crate::contact::NearestFacet;
 use crate::fem::DeformableModel;
 use crate::math::{Mat3, Vec3};
+use crate::mesh::{sorted_face, sorted_faces};
 use std::collections::HashMap;
 
 /// Mean extents of the boxes of tetrahedra along a cell of the grid.
@@ -74,15 +75,7 @@ impl<'a> TetGrid<'a> {
 }
 
 fn behind(model: &DeformableModel, triangles: &[[u32; 3]]) -> Vec<u32> {
-    let sorted = |mut face: [u32; 3]| {
-        face.sort_unstable();
-        face
-    };
-    let mut of_face = HashMap::new();
-    for (tet, &[a, b, c, d]) in (0..).zip(&model.tetrahedra) {
-        for face in [[b, c, d], [a, c, d], [a, b, d], [a, b, c]] {
-            of_face.insert(sorted(face), tet);
-        }
-    }
-    triangles.iter().map(|t| of_face.get(&sorted(*t)).copied().unwrap_or(0)).collect()
+    let faces = (0..).zip(&model.tetrahedra).flat_map(|(tet, nodes)| sorted_faces(nodes).map(|f| (f, tet)));
+    let of_face: HashMap<[u32; 3], u32> = faces.collect();
+    triangles.iter().map(|t| of_face.get(&sorted_face(*t)).copied().unwrap_or(0)).collect()
 }

@@ -56,7 +56,8 @@ pub(super) fn list_contacts(
     contacts: &mut Vec<DeformableContact>,
 ) {
     for ContactResult { constraint, force, gap } in work.island.contacts.results() {
-        let [Endpoint::Soft { body, .. }, Endpoint::Rigid { point, .. }] = &constraint.endpoints else {
+        let [Endpoint::Soft { body, nodes, weights }, Endpoint::Rigid { point, .. }] = &constraint.endpoints
+        else {
             continue;
         };
         let ConstraintKey::Obstacle(key) = constraint.key else { continue };
@@ -68,8 +69,15 @@ pub(super) fn list_contacts(
             normal: to_real(normal),
             force: to_real(&force),
             gap,
+            vertices: vertices_of(work, *body, nodes),
+            weights: *weights,
         });
     }
+}
+
+/// The user's names of a body's nodes.
+fn vertices_of(work: &IslandWork, body: usize, nodes: &[u32; 3]) -> [usize; 3] {
+    nodes.map(|node| work.island.bodies[body].model.vertex_of_node[node as usize] as usize)
 }
 
 /// Lists the contacts between the bodies of an island.
@@ -80,7 +88,10 @@ pub(super) fn list_pair_contacts(
 ) {
     let is_pair = |contact: &ContactResult<'_>| contact.constraint.key.is_soft_pair();
     for ContactResult { constraint, force, gap } in work.island.contacts.results().filter(is_pair) {
-        let [Endpoint::Soft { body: first, .. }, Endpoint::Soft { body: second, .. }] = constraint.endpoints
+        let [
+            Endpoint::Soft { body: first, nodes: nodes1, weights: weights1 },
+            Endpoint::Soft { body: second, nodes: nodes2, weights: weights2 },
+        ] = constraint.endpoints
         else {
             continue;
         };
@@ -92,6 +103,8 @@ pub(super) fn list_pair_contacts(
             normal: to_real(&constraint.frame[0]),
             force: to_real(&force),
             gap,
+            vertices: [vertices_of(work, first, &nodes1), vertices_of(work, second, &nodes2)],
+            weights: [weights1, weights2],
         });
     }
 }
