@@ -64,8 +64,8 @@ proptest! {
             let at = Vector3::from(body.model().rest_position(vertex)) + own;
             body.set_position(vertex, at.into()).unwrap();
         }
-        // Means of domains have other volumes than the sum of their elements' only in the second order: 1e-2 of strains of 0.2.
-        let tolerance = if smoothed { 0.1 } else { 1e-9 };
+        // Means of domains have other volumes than their elements, in the second order: measured up to 2e-3 at strains of 0.2.
+        let tolerance = if smoothed { 5e-3 } else { 1e-9 };
         let at = |v: u32| Vector3::from(body.position(v as usize).unwrap());
         let volume = |t: [u32; 4]| {
             let [a, b, c, d] = t.map(at);
@@ -102,87 +102,85 @@ fn invariants_of_a_stress() {
     assert!((stress.traction(Vector::X) - Vector::Y * 3.0).length() < 1e-6);
 }
 
-/// A thick ring under pressure inside, in plane strain: Lamé's hoop stress at the inner wall `p (a² + b²)/(b² − a²)`.
-fn hoop_error(around: usize, across: usize, smoothed: bool) -> f64 {
-    let (a, b, height, pressure) = (0.1, 0.2, 0.04, 1.0e4);
-    let mut vertices = Vec::new();
-    let mut tets = Vec::new();
-    let index = |i: usize, j: usize, k: usize| ((i % around) * (across + 1) + j) * 2 + k;
+/// Inner and outer radius of a thick ring, its height \[m\], and the pressure inside \[Pa\].
+const RING: (f64, f64, f64, f64) = (0.1, 0.2, 0.04, 1.0e4);
+
+/// Vertex `k` of two along the axis, `j` of those along the radius, at the `i`-th angle.
+fn ring_vertex(around: usize, across: usize, [i, j, k]: [usize; 3]) -> usize {
+    ((i % around) * (across + 1) + j) * 2 + k
+}
+
+/// Five tetrahedra in each cell, turned from cell to cell.
+fn ring(around: usize, across: usize) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
+    let (a, b, height, _) = RING;
+    let (mut vertices, mut tetrahedra) = (Vec::new(), Vec::new());
     for i in 0..around {
         let angle = std::f64::consts::TAU * i as f64 / around as f64;
         for j in 0..=across {
-            let r = a * (b / a as f64).powf(j as f64 / across as f64);
-            for k in 0..2 {
-                vertices.push([r * angle.cos(), r * angle.sin(), height * k as f64]);
-            }
+            let r = a * (b / a).powf(j as f64 / across as f64);
+            vertices.extend([0.0, height].map(|z| [r * angle.cos(), r * angle.sin(), z]));
         }
     }
-    for i in 0..around {
-        for j in 0..across {
-            let n = |di: usize, dj: usize, dk: usize| index(i + di, j + dj, dk) as u32;
-            let hex = [
-                n(0, 0, 0),
-                n(0, 1, 0),
-                n(1, 1, 0),
-                n(1, 0, 0),
-                n(0, 0, 1),
-                n(0, 1, 1),
-                n(1, 1, 1),
-                n(1, 0, 1),
-            ];
-            let five = if (i + j) % 2 == 0 {
-                [[0, 1, 3, 4], [1, 2, 3, 6], [4, 6, 5, 1], [4, 7, 6, 3], [1, 3, 4, 6]]
-            } else {
-                [[0, 1, 2, 5], [0, 2, 3, 7], [0, 5, 7, 4], [2, 7, 5, 6], [0, 2, 7, 5]]
-            };
-            tets.extend(five.map(|t| t.map(|c| hex[c])));
-        }
+    const CORNERS: [[usize; 3]; 8] =
+        [[0, 0, 0], [0, 1, 0], [1, 1, 0], [1, 0, 0], [0, 0, 1], [0, 1, 1], [1, 1, 1], [1, 0, 1]];
+    for (i, j) in (0..around).flat_map(|i| (0..across).map(move |j| (i, j))) {
+        let cell = CORNERS.map(|[di, dj, dk]| ring_vertex(around, across, [i + di, j + dj, dk]) as u32);
+        let five = if (i + j) % 2 == 0 {
+            [[0, 1, 3, 4], [1, 2, 3, 6], [4, 6, 5, 1], [4, 7, 6, 3], [1, 3, 4, 6]]
+        } else {
+            [[0, 1, 2, 5], [0, 2, 3, 7], [0, 5, 7, 4], [2, 7, 5, 6], [0, 2, 7, 5]]
+        };
+        tetrahedra.extend(five.map(|tet| tet.map(|corner| cell[corner])));
     }
-    let mesh = TetMesh::new(vertices.clone(), tets).unwrap();
-    let mut model = DeformableModel::new(&mesh);
-    if smoothed {
-        model = model.smoothed();
-    }
+    (vertices, tetrahedra)
+}
+
+/// The ring at rest under its pressure.
+fn pressed_ring(around: usize, across: usize, smoothed: bool) -> (DeformableWorld, DeformableBodyHandle) {
+    let (a, _, height, pressure) = RING;
+    let (vertices, tetrahedra) = ring(around, across);
+    let model = DeformableModel::new(&TetMesh::new(vertices, tetrahedra).unwrap());
+    let model = if smoothed { model.smoothed() } else { model };
     let material = DeformableMaterial::new(1.0e8, 0.3).mass_damping(100.0);
-    let builder =
-        DeformableBodyBuilder::model(std::sync::Arc::new(model)).material(material).gravity_scale(0.0);
-    let mut world = DeformableWorld::new();
     let tight = |s: &mut SolverSettings| (s.max_iterations, s.tolerance) = (200, 1e-9);
-    let handle = world.insert(builder.tune(tight).can_sleep(false)).unwrap();
+    let ring = DeformableBodyBuilder::model(std::sync::Arc::new(model)).material(material).gravity_scale(0.0);
+    let mut world = DeformableWorld::new();
+    let handle = world.insert(ring.tune(tight).can_sleep(false)).unwrap();
+    // Each inner vertex carries the pressure on half of the sides beside it.
+    let half = std::f64::consts::PI / around as f64;
+    let share = pressure * 2.0 * a * half.sin() * height * half.cos() / 2.0;
+    for i in 0..around {
+        let angle = 2.0 * half * i as f64;
+        let out = Vector::new(angle.cos() as f32, angle.sin() as f32, 0.0) * share as f32;
+        let inner = [0, 1].map(|k| ring_vertex(around, across, [i, 0, k]));
+        inner.iter().for_each(|vertex| world.bodies[handle].add_force(&[*vertex], out).unwrap());
+    }
     let mut physics = PhysicsWorld::new();
     physics.integration_parameters.dt = 0.05;
-    // Pushed outward by what the inner polygon's sides carry; faces in the plane keep their height.
-    let side = 2.0 * a * (std::f64::consts::PI / around as f64).sin();
-    for i in 0..around {
-        let angle = std::f64::consts::TAU * i as f64 / around as f64;
-        let share = pressure * side * height * (std::f64::consts::PI / around as f64).cos() / 2.0;
-        let out = Vector::new(angle.cos() as f32, angle.sin() as f32, 0.0) * share as f32;
-        for k in 0..2 {
-            world.bodies[handle].add_force(&[index(i, 0, k)], out).unwrap();
-        }
-    }
     (0..60).for_each(|_| world.step(&mut physics));
+    (world, handle)
+}
+
+/// Largest error of the hoop stress over the layers of cells, against Lamé's `p a²/(b² − a²) (1 + b²/r²)`.
+fn hoop_error(around: usize, across: usize, smoothed: bool) -> f64 {
+    let (a, b, _, pressure) = RING;
+    let (world, handle) = pressed_ring(around, across, smoothed);
     let body = &world.bodies[handle];
-    let stresses = body.stresses();
-    let (mut worst, mut checked) = (0.0f64, 0);
-    let mut sums = std::collections::BTreeMap::new();
-    for (t, stress) in body.model().tetrahedra().zip(&stresses) {
-        let centre = t.map(|v| Vector3::from(vertices[v as usize])).iter().sum::<Vector3<f64>>() / 4.0;
-        let around = Vector3::new(-centre.y, centre.x, 0.0).normalize();
-        let cell = ((centre.xy().norm() / a).ln() / (b / a as f64).ln() * across as f64) as usize;
+    let mut layers = vec![(0.0, 0.0, 0.0); across];
+    for (tet, stress) in body.model().tetrahedra().zip(body.stresses()) {
+        let corners = tet.map(|v| Vector3::from(body.model().rest_position(v as usize)));
+        let centre = corners.iter().sum::<Vector3<f64>>() / 4.0;
+        let (r, around) = (centre.xy().norm(), Vector3::new(-centre.y, centre.x, 0.0).normalize());
+        let layer = &mut layers[((r / a).ln() / (b / a).ln() * across as f64) as usize];
         let hoop = (Matrix3::from(stress.cauchy) * around).dot(&around);
-        let sum = sums.entry(cell).or_insert((0.0, 0.0, 0));
-        *sum = (sum.0 + hoop, sum.1 + centre.xy().norm(), sum.2 + 1);
+        *layer = (layer.0 + hoop, layer.1 + r, layer.2 + 1.0);
     }
-    for (cell, (hoop, r, count)) in sums {
-        let (hoop, r) = (hoop / f64::from(count), r / f64::from(count));
+    let error = |(hoop, r, count): (f64, f64, f64)| {
+        let (hoop, r) = (hoop / count, r / count);
         let expected = pressure * a * a / (b * b - a * a) * (1.0 + b * b / (r * r));
-        println!("cell {cell}: {hoop:.1} of {expected:.1}");
-        worst = worst.max((hoop / expected - 1.0).abs());
-        checked += 1;
-    }
-    assert_eq!(checked, across);
-    worst
+        (hoop / expected - 1.0).abs()
+    };
+    layers.into_iter().map(error).fold(0.0, f64::max)
 }
 
 #[test]
