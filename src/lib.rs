@@ -100,7 +100,9 @@ pub use energy::Elasticity;
 pub use error::{BodyError, DeformableBodyError, HandleError};
 pub use fem::{DeformableModel, SystemMatrix};
 pub use material::{DeformableMaterial, MaterialError};
-pub use mesh::{MeshError, Structure, TetMesh};
+pub use mesh::{
+    MeshError, Structure, SurfaceFault, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, TetMesh,
+};
 pub use pipeline::{
     DeformableChannelEventCollector, DeformableCollisionEvent, DeformableContact,
     DeformableContactForceEvent, DeformableCounters, DeformableEventHandler, DeformablePairContact,
@@ -122,7 +124,7 @@ pub mod prelude {
         DeformableSkin, DeformableSolverContact, DeformableStress, DeformableSurfaceMesh,
         DeformableSurfacePoint, DeformableWind, DeformableWorld, Elasticity, FactorPrecision, Fidelity,
         Frames, Integrator, JointForce, JointRole, PhysicsParts, RigidContact, SolvedJoint, Solver,
-        SolverSettings, Structure, SystemMatrix, TetMesh,
+        SolverSettings, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix, TetMesh,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

@@ -1,6 +1,9 @@
 //! What the types of the surface promise without being run.
 use foible3d::prelude::*;
-use foible3d::{BodyError, DeformableState, HandleError, MaterialError, MeshError};
+use foible3d::{
+    BodyError, DeformableState, HandleError, MaterialError, MeshError, SurfaceFault, SurfaceRepaired,
+    SurfaceReport,
+};
 use std::fmt::Debug;
 
 /// A game may move it to another thread, and read it from several.
@@ -24,7 +27,7 @@ promises! {
         Acceleration, FactorPrecision, Fidelity, Elasticity, DeformableBodyHandle, DeformableAttachment,
         DeformableAttachmentHandle, AttachTo, DeformableContact, DeformablePairContact, RigidContact, JointForce,
         JointRole, SolvedJoint, DeformableSurfacePoint, DeformableBodyError, BodyError, HandleError, MaterialError,
-        MeshError, DeformableContactPartner, DeformableWind, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableCollisionEvent,
+        MeshError, DeformableContactPartner, DeformableWind, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceFault, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableCollisionEvent,
         DeformableContactForceEvent, DeformableChannelEventCollector, DeformableSolverContact,
         DeformablePairFilterContext<'static>, DeformableContactModificationContext<'static>;
     is_printed: DeformableColliders, DeformableSkin, DeformableSurfaceMesh, DeformableChannelEventCollector, DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody,

@@ -10,7 +10,8 @@ fn text(path: &str) -> Option<String> {
 /// What stands between backticks and begins with a folder of tests or sources.
 fn references(text: &str) -> impl Iterator<Item = &str> {
     let quoted = text.split('`').skip(1).step_by(2);
-    quoted.filter(|r| ["tests/", "benches/", "src/"].iter().any(|folder| r.starts_with(folder)))
+    quoted
+        .filter(|r| ["tests/", "benches/", "src/", "bevy/tests/"].iter().any(|folder| r.starts_with(folder)))
 }
 
 /// Whether a source holds a function of that name with `#[test]` among the attributes and comments above it, on

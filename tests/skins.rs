@@ -264,7 +264,7 @@ fn far_vertices_go_with_the_nearest_part_and_bind_as_fast() {
 /// Volume within triangles that are wound outward \[m³\].
 fn volume(mesh: &DeformableSurfaceMesh) -> f32 {
     let corners = |t: &[u32; 3]| t.map(|v| mesh.vertices[v as usize]);
-    mesh.triangles.iter().map(|t| corners(t)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+    mesh.triangles.iter().map(corners).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
 }
 
 #[test]

@@ -4,9 +4,12 @@
 
 mod fill;
 mod gmsh;
+#[cfg(feature = "import")]
+mod import;
 mod lattice;
 mod mesh_error;
 mod ordering;
+mod repair;
 mod structure;
 mod structure_check;
 mod surface;
@@ -14,6 +17,7 @@ mod tet_mesh;
 
 pub use mesh_error::MeshError;
 pub(crate) use ordering::{node_adjacency, sweep_order};
+pub use repair::{SurfaceFault, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport};
 pub use structure::Structure;
 pub(crate) use surface::{NONE, Surface, point_normals, sorted_face, sorted_faces};
 pub use tet_mesh::TetMesh;
