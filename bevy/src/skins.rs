@@ -49,7 +49,7 @@ pub(crate) fn make_surface_meshes(
     }
 }
 
-type UnboundSkins<'a> = (Entity, &'a Mesh3d, Option<&'a DeformableSkinOf>, Has<DeformableHandle>);
+type UnboundSkins<'a> = (Entity, &'a Mesh3d, Option<&'a DeformableSkinOf>);
 
 /// Binds meshes of bodies, and those that are skins of others, as soon as both are there. A mesh that others show too is
 /// copied for this entity.
@@ -65,7 +65,7 @@ pub(crate) fn bind(
     >,
 ) {
     let Some(mut meshes) = meshes else { return };
-    for (entity, mesh, skin_of, _) in &unbound {
+    for (entity, mesh, skin_of) in &unbound {
         let owner = skin_of.map_or(entity, |skin_of| skin_of.0);
         let Ok((handle, link)) = bodies.get(owner) else { continue };
         let Some(body) = contexts.get(link.0).ok().and_then(|c| c.world.bodies.get(handle.0)) else {
