@@ -83,7 +83,7 @@ impl RapierContextDeformables {
     }
 
     /// Hooks for pairs of deformable bodies: what may touch what, belts, one-way platforms.
-    pub fn set_hooks(&mut self, hooks: impl DeformableHooks + Send + Sync + 'static) {
+    pub fn set_hooks(&mut self, hooks: impl DeformableHooks + Send + 'static) {
         self.hooks = Box::new(hooks);
     }
 

@@ -24,15 +24,15 @@ pub(crate) struct BoundSkin {
     asleep_at: Option<GlobalTransform>,
 }
 
+/// What is to be drawn and has no mesh yet.
+type Undrawn = (With<DeformableMeshSync>, Without<BoundSkin>, Without<Mesh3d>);
+
 /// Meshes of bodies' own surfaces.
 pub(crate) fn make_surface_meshes(
     mut commands: Commands,
     meshes: Option<ResMut<Assets<Mesh>>>,
     contexts: Query<&RapierContextDeformables>,
-    bodies: Query<
-        (Entity, &DeformableHandle, &RapierContextEntityLink),
-        (With<DeformableMeshSync>, Without<BoundSkin>, Without<Mesh3d>),
-    >,
+    bodies: Query<(Entity, &DeformableHandle, &RapierContextEntityLink), Undrawn>,
 ) {
     let Some(mut meshes) = meshes else { return };
     for (entity, handle, link) in &bodies {
@@ -49,6 +49,10 @@ pub(crate) fn make_surface_meshes(
     }
 }
 
+/// What has a body of its own, or follows another's.
+type Unbound =
+    (Without<BoundSkin>, Without<DeformableError>, Or<(With<DeformableHandle>, With<DeformableSkinOf>)>);
+
 type UnboundSkins<'a> = (Entity, &'a Mesh3d, Option<&'a DeformableSkinOf>);
 
 /// Binds meshes of bodies, and those that are skins of others, as soon as both are there. A mesh that others show too is
@@ -59,10 +63,7 @@ pub(crate) fn bind(
     contexts: Query<&RapierContextDeformables>,
     transforms: TransformHelper,
     bodies: Query<(&DeformableHandle, &RapierContextEntityLink)>,
-    unbound: Query<
-        UnboundSkins,
-        (Without<BoundSkin>, Without<DeformableError>, Or<(With<DeformableHandle>, With<DeformableSkinOf>)>),
-    >,
+    unbound: Query<UnboundSkins, Unbound>,
 ) {
     let Some(mut meshes) = meshes else { return };
     for (entity, mesh, skin_of) in &unbound {
@@ -117,8 +118,7 @@ fn bound(
         _ => vec![[0.0; 3]; positions.len()],
     };
     let turn = to_rest.matrix3.inverse().transpose();
-    let normals: Vec<Vec3> =
-        normals.iter().map(|n| Vec3::from(turn * Vec3::from(*n)).normalize_or_zero()).collect();
+    let normals: Vec<Vec3> = normals.iter().map(|n| (turn * Vec3::from(*n)).normalize_or_zero()).collect();
     let skin = DeformableSkin::bind(body.model(), &positions, &normals)
         .map_err(|error| DeformableError(format!("skin: {error}")))?;
     Ok((skin, positions, normals, mesh))
@@ -159,7 +159,7 @@ pub(crate) fn write(
         let positions: Vec<[f32; 3]> =
             skin.positions.iter().map(|p| to_local.transform_point3(*p).to_array()).collect();
         let normals: Vec<[f32; 3]> =
-            skin.normals.iter().map(|n| Vec3::from(turn * *n).normalize_or_zero().to_array()).collect();
+            skin.normals.iter().map(|n| (turn * *n).normalize_or_zero().to_array()).collect();
         mesh.insert_attribute(Mesh::ATTRIBUTE_POSITION, positions);
         mesh.insert_attribute(Mesh::ATTRIBUTE_NORMAL, normals);
         skin.asleep_at = body.is_sleeping().then_some(global);
