@@ -17,6 +17,14 @@ pub enum BodyError {
         /// Number of vertices of the body.
         vertices: usize,
     },
+    /// No element of the body is in that region.
+    #[error("region {region} does not exist: the body has {regions}")]
+    NoSuchRegion {
+        /// The region asked for.
+        region: u32,
+        /// Number of regions of the body.
+        regions: usize,
+    },
     /// A state of another mesh, or lists of vertices to attach that do not go together.
     #[error("{vertices} vertices are given where {expected} are expected")]
     WrongSize {

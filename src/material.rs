@@ -182,6 +182,11 @@ impl DeformableMaterial {
         Lame { mu: e / (2.0 * (1.0 + nu)), lambda: e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)) }
     }
 
+    /// The same without strain limits.
+    pub(crate) fn without_limits(&self) -> Self {
+        Self { strain_limits: None, ..*self }
+    }
+
     /// Weight of what is beyond the strain limits \[Pa\].
     pub(crate) fn limit_weight(&self) -> f64 {
         STIFFENING * self.youngs_modulus

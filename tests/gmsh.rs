@@ -35,6 +35,10 @@ fn files_of_gmsh_hold_the_same_box() {
         let mesh = TetMesh::read_gmsh(path_of(name)).unwrap();
         assert_eq!((mesh.vertices().len(), mesh.tetrahedra().len()), (30, 59), "{name}");
         assert!((mesh.volume() - 0.48).abs() < 1e-12, "{name}: {}", mesh.volume());
+        // Gmsh writes no groups to version 2 when it is told to save all.
+        let group = if name.starts_with('4') { 7 } else { 0 };
+        assert!(mesh.regions().iter().all(|region| *region == group), "{name}");
+        assert_eq!(mesh.region_named("the volume"), Some(7), "{name}");
         // Text has 16 digits.
         let apart = corners(&mesh)
             .iter()
@@ -118,11 +122,16 @@ impl Writer {
         if self.format.version == "4.1" { self.size(i) } else { self.int(i) }
     }
 
-    fn entity(&mut self, dimension: i64) {
-        let [first, second] = if self.format.version == "4.1" { [dimension, 5] } else { [5, dimension] };
+    fn entity(&mut self, dimension: i64, tag: i64) {
+        let [first, second] = if self.format.version == "4.1" { [dimension, tag] } else { [tag, dimension] };
         self.int(first);
         self.int(second);
     }
+}
+
+/// Tetrahedra in the physical group 3; the others are in none.
+fn grouped(mesh: &TetMesh) -> usize {
+    mesh.tetrahedra().len() / 3
 }
 
 /// A file of a mesh whose vertices have these tags, with a triangle before its tetrahedra.
@@ -133,7 +142,11 @@ fn written(mesh: &TetMesh, tags: &[i64], format: Format) -> Vec<u8> {
         w.int(1);
         w.text("\n");
     }
-    w.text("$EndMeshFormat\n$Nodes\n");
+    w.text("$EndMeshFormat\n$PhysicalNames\n2\n2 3 \"skin\"\n3 3 \"a stiff back\"\n$EndPhysicalNames\n");
+    if format.version != "2.2" {
+        write_entities(&mut w);
+    }
+    w.text("$Nodes\n");
     if format.version == "2.2" {
         w.text(&format!("{}\n", tags.len()));
         for (tag, x) in tags.iter().zip(mesh.vertices()) {
@@ -149,9 +162,11 @@ fn written(mesh: &TetMesh, tags: &[i64], format: Format) -> Vec<u8> {
     let count = mesh.tetrahedra().len() as i64;
     if format.version == "2.2" {
         w.text(&format!("{}\n", count + 1));
-        write_elements(&mut w, 2, &[vec![tag_of(0), tag_of(1), tag_of(2)]]);
+        write_elements(&mut w, 2, (7, 1), &[vec![tag_of(0), tag_of(1), tag_of(2)]]);
         let tets: Vec<_> = mesh.tetrahedra().iter().map(|t| t.map(tag_of).to_vec()).collect();
-        write_elements(&mut w, 4, &tets);
+        let (first, second) = tets.split_at(grouped(mesh));
+        write_elements(&mut w, 4, (-3, 2), first);
+        write_elements(&mut w, 4, (0, 2 + first.len() as i64), second);
     } else {
         write_element_blocks(&mut w, mesh, tag_of);
     }
@@ -170,7 +185,7 @@ fn write_node_blocks(w: &mut Writer, mesh: &TetMesh, tags: &[i64]) {
     }
     w.line();
     for (dimension, part) in [(2, 0..half), (3, half..tags.len())] {
-        w.entity(dimension);
+        w.entity(dimension, 5);
         w.int(i64::from(dimension == 2));
         w.size(part.len() as i64);
         w.line();
@@ -192,36 +207,59 @@ fn write_node_blocks(w: &mut Writer, mesh: &TetMesh, tags: &[i64]) {
     }
 }
 
-/// Elements of version 2 of one type.
-fn write_elements(w: &mut Writer, kind: i64, elements: &[Vec<i64>]) {
+/// A point, a curve, a surface in a group, and two volumes, the first in a group.
+fn write_entities(w: &mut Writer) {
+    w.text("$Entities\n");
+    [1, 1, 1, 2].iter().for_each(|count| w.size(*count));
+    w.line();
+    for (dimension, tag, group) in
+        [(0, 1, None), (1, 1, None), (2, 5, Some(8)), (3, 5, Some(-3)), (3, 6, None)]
+    {
+        w.int(tag);
+        let numbers = if dimension == 0 && w.format.version == "4.1" { 3 } else { 6 };
+        (0..numbers).for_each(|_| w.real(0.5));
+        w.size(i64::from(group.is_some()));
+        group.iter().for_each(|group| w.int(*group));
+        if dimension > 0 {
+            w.size(2);
+            [1, -1].iter().for_each(|end| w.int(*end));
+        }
+        w.line();
+    }
+    w.text("\n$EndEntities\n");
+}
+
+/// Elements of version 2 of one type in a physical group, numbered from a first.
+fn write_elements(w: &mut Writer, kind: i64, (group, first): (i64, i64), elements: &[Vec<i64>]) {
     if w.format.is_binary {
         [kind, elements.len() as i64, 2].iter().for_each(|i| w.int(*i));
     }
     for (k, nodes) in elements.iter().enumerate() {
-        w.int(k as i64 + 1);
+        w.int(first + k as i64);
         if !w.format.is_binary {
             w.int(kind);
             w.int(2);
         }
-        [7, 5].iter().chain(nodes).for_each(|i| w.int(*i));
+        [group, 5].iter().chain(nodes).for_each(|i| w.int(*i));
         w.line();
     }
 }
 
 fn write_element_blocks(w: &mut Writer, mesh: &TetMesh, tag_of: impl Fn(u32) -> i64) {
     let count = mesh.tetrahedra().len() as i64;
-    w.size(2);
+    w.size(3);
     w.size(count + 1);
     if w.format.version == "4.1" {
         w.size(1);
         w.size(count + 1);
     }
     w.line();
-    let tets = mesh.tetrahedra().iter().map(|t| t.map(&tag_of).to_vec());
-    for (dimension, kind, elements) in
-        [(2, 2, vec![vec![tag_of(0), tag_of(1), tag_of(2)]]), (3, 4, tets.collect())]
+    let tets: Vec<Vec<i64>> = mesh.tetrahedra().iter().map(|t| t.map(&tag_of).to_vec()).collect();
+    let (first, second) = tets.split_at(grouped(mesh));
+    let triangle = [vec![tag_of(0), tag_of(1), tag_of(2)]];
+    for (dimension, entity, kind, elements) in [(2, 5, 2, &triangle[..]), (3, 5, 4, first), (3, 6, 4, second)]
     {
-        w.entity(dimension);
+        w.entity(dimension, entity);
         w.int(kind);
         w.size(elements.len() as i64);
         w.line();
@@ -249,6 +287,9 @@ proptest! {
         for (k, format) in FORMATS.into_iter().enumerate() {
             let found = read(&format!("tags-{k}"), &written(&mesh, &tags, format)).unwrap();
             prop_assert_eq!(corners(&found), corners(&mesh), "{:?}", format);
+            let (first, second) = found.regions().split_at(grouped(&mesh));
+            prop_assert!(first.iter().all(|r| *r == 3) && second.iter().all(|r| *r == 0), "{:?}", format);
+            prop_assert_eq!(found.region_named("a stiff back"), Some(3));
         }
     }
 

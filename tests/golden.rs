@@ -123,7 +123,7 @@ fn final_states_keep_their_bits() {
     let scenes: [(&str, Scene, u64); 3] = [
         ("stack", stack, 0x287c_3b5d_7085_a09e),
         ("hangings", hangings, 0x0177_f341_476c_02e1),
-        ("heap", heap, 0xb578_c5d9_c58f_c1d6),
+        ("heap", heap, 0x2ccd_4565_a3a9_e11a),
     ];
     let mut changed = Vec::new();
     for (name, scene, expected) in scenes {

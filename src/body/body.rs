@@ -60,7 +60,15 @@ pub(crate) struct StepReport {
 pub struct DeformableBody {
     pub(crate) model: Arc<DeformableModel>,
     pub(crate) state: DeformableState,
-    pub(crate) material: DeformableMaterial,
+    /// One per region of the model, and the one of those that have none of their own.
+    pub(crate) materials: Vec<DeformableMaterial>,
+    pub(super) material: DeformableMaterial,
+    /// Regions with materials of their own, ascending.
+    pub(super) region_materials: Vec<(u32, DeformableMaterial)>,
+    /// Of the nodes \[kg\].
+    pub(crate) masses: Vec<f64>,
+    /// Friction and restitution of the nodes; empty where they are those of the material everywhere.
+    pub(crate) node_surfaces: Vec<[f64; 2]>,
     /// Where the nodes were before the last step \[m\]; empty if no one may be shown the way from there.
     pub(crate) before: Vec<Vec3>,
     /// Ascending by node.
@@ -104,10 +112,14 @@ impl DeformableBody {
             sleep: Sleep::default(),
             factor_base: FactorBase::default(),
         };
-        Self {
+        let mut body = Self {
             model,
             state,
+            materials: Vec::new(),
             material,
+            region_materials: Vec::new(),
+            masses: Vec::new(),
+            node_surfaces: Vec::new(),
             before: Vec::new(),
             pins: Vec::new(),
             held_pins: Vec::new(),
@@ -131,7 +143,9 @@ impl DeformableBody {
             active_hooks: ActiveHooks::empty(),
             contact_force_event_threshold: 0.0,
             user_data: 0,
-        }
+        };
+        body.distribute_materials();
+        body
     }
 
     /// The constant part of the body.
@@ -236,15 +250,11 @@ impl DeformableBody {
     // ── For the other rooms of the crate ────────────────────────────────
 
     pub(crate) fn elements(&self) -> Elements<'_> {
-        Elements { model: &self.model, material: &self.material, activation: self.activation }
+        Elements { model: &self.model, materials: &self.materials, activation: self.activation }
     }
 
     pub(crate) fn node_mass(&self, node: usize) -> f64 {
-        self.material.density * self.model.node_volumes[node]
-    }
-
-    pub(super) fn node_masses(&self) -> Vec<f64> {
-        (0..self.state.x.len()).map(|node| self.node_mass(node)).collect()
+        self.masses[node]
     }
 
     pub(super) fn node(&self, vertex: usize) -> Result<usize, BodyError> {
@@ -252,9 +262,8 @@ impl DeformableBody {
     }
 
     pub(super) fn weighted_mean(&self, values: &[Vec3]) -> Vec3 {
-        let weights = &self.model.node_volumes;
-        let sum = values.iter().zip(weights).fold(Vec3::zeros(), |a, (p, w)| a + p * *w);
-        sum / weights.iter().sum::<f64>()
+        let sum = values.iter().zip(&self.masses).fold(Vec3::zeros(), |a, (p, m)| a + p * *m);
+        sum / self.masses.iter().sum::<f64>()
     }
 }
 

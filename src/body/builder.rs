@@ -33,6 +33,7 @@ use std::sync::Arc;
 pub struct DeformableBodyBuilder {
     model: Result<Arc<DeformableModel>, MeshError>,
     material: DeformableMaterial,
+    region_materials: Vec<(u32, DeformableMaterial)>,
     settings: SolverSettings,
     pose: Pose,
     body_type: RigidBodyType,
@@ -142,6 +143,7 @@ impl DeformableBodyBuilder {
         Self {
             model,
             material: DeformableMaterial::new(1.0e6, 0.3),
+            region_materials: Vec::new(),
             settings: build.defaults(),
             pose: Pose::IDENTITY,
             body_type: RigidBodyType::Dynamic,
@@ -171,6 +173,32 @@ impl DeformableBodyBuilder {
     /// Sets the material.
     pub fn material(mut self, material: DeformableMaterial) -> Self {
         self.material = material;
+        self
+    }
+
+    /// Puts every element into the region that `region` says of the place of its middle \[m\] in the rest shape: see
+    /// [`TetMesh::painted`].
+    ///
+    /// ```
+    /// use foible3d::prelude::*;
+    /// use rapier3d::prelude::*;
+    /// // A finger with a stiff back.
+    /// let finger = DeformableBodyBuilder::cuboid(Vector::new(0.05, 0.01, 0.01), [20, 4, 4])
+    ///     .regions(|[_, y, _]| u32::from(y > 0.005))
+    ///     .material(DeformableMaterial::new(1.0e5, 0.45).density(1_100.0))
+    ///     .region_material(1, DeformableMaterial::new(1.0e9, 0.4).density(1_200.0))
+    ///     .build()?;
+    /// assert!((finger.mass() - 4.0e-5 * 1_125.0).abs() < 1e-9);
+    /// # Ok::<(), DeformableBodyError>(())
+    /// ```
+    pub fn regions(mut self, region: impl Fn([f64; 3]) -> u32) -> Self {
+        self.model = self.model.map(|model| Arc::new(model.painted(region)));
+        self
+    }
+
+    /// Gives a region a material of its own; all others have that of [`DeformableBodyBuilder::material`].
+    pub fn region_material(mut self, region: u32, material: DeformableMaterial) -> Self {
+        self.region_materials.push((region, material));
         self
     }
 
@@ -311,6 +339,9 @@ impl DeformableBodyBuilder {
     pub fn build(&self) -> Result<DeformableBody, DeformableBodyError> {
         self.material.validate()?;
         let mut body = DeformableBody::new(self.model.clone()?, self.material);
+        for (region, material) in &self.region_materials {
+            body.set_region_material(*region, *material)?;
+        }
         body.teleport(self.pose)?;
         body.set_body_type(self.body_type);
         body.set_vels(self.linvel, self.angvel)?;

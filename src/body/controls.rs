@@ -2,6 +2,7 @@
 
 use super::body::DeformableBody;
 use super::settings::{Acceleration, SolverSettings};
+use crate::error::{BodyError, DeformableBodyError};
 use crate::material::{DeformableMaterial, MaterialError};
 use rapier3d::dynamics::CoefficientCombineRule;
 use rapier3d::geometry::InteractionGroups;
@@ -13,7 +14,7 @@ const MAX_CLUSTERS: usize = 32;
 const CONTACT_TOLERANCES: [f64; 2] = [1.0e-12, 0.1];
 
 impl DeformableBody {
-    /// The material.
+    /// The material, of all regions that have none of their own.
     pub fn material(&self) -> &DeformableMaterial {
         &self.material
     }
@@ -26,7 +27,53 @@ impl DeformableBody {
         self.wake_up();
         material.validate()?;
         self.material = material;
+        self.distribute_materials();
         Ok(())
+    }
+
+    /// The material of a region: its own, or the body's.
+    pub fn region_material(&self, region: u32) -> &DeformableMaterial {
+        let own = self.region_materials.binary_search_by_key(&region, |(tag, _)| *tag);
+        own.map_or(&self.material, |place| &self.region_materials[place].1)
+    }
+
+    /// Gives a region of the model a material of its own. Stiffness, density and stiffness damping are those of its elements; mass
+    /// damping is that of the whole body, by mass the mean; friction and restitution are those of its surface, and between regions
+    /// the mean.
+    ///
+    /// # Errors
+    /// A material out of range, [`BodyError::NoSuchRegion`]; nothing is changed then.
+    pub fn set_region_material(
+        &mut self,
+        region: u32,
+        material: DeformableMaterial,
+    ) -> Result<(), DeformableBodyError> {
+        material.validate()?;
+        if self.model.region(region).is_none() {
+            return Err(BodyError::NoSuchRegion { region, regions: self.model.regions().len() }.into());
+        }
+        self.wake_up();
+        match self.region_materials.binary_search_by_key(&region, |(tag, _)| *tag) {
+            Ok(place) => self.region_materials[place].1 = material,
+            Err(place) => self.region_materials.insert(place, (region, material)),
+        }
+        self.distribute_materials();
+        Ok(())
+    }
+
+    /// Makes what follows from materials and model.
+    pub(super) fn distribute_materials(&mut self) {
+        let model = self.model.clone();
+        self.materials = model.regions().map(|region| *self.region_material(region)).collect();
+        self.masses = model.weigh_nodes(&self.materials, |material| material.density);
+        self.node_surfaces.clear();
+        let surface = |material: &DeformableMaterial| [material.friction, material.restitution];
+        if self.materials.iter().any(|material| surface(material) != surface(&self.material)) {
+            let [friction, restitution] =
+                [0, 1].map(|k| model.weigh_nodes(&self.materials, |material| surface(material)[k]));
+            let both = friction.into_iter().zip(restitution).zip(&model.node_volumes);
+            self.node_surfaces.extend(both.map(|((f, e), volume)| [f / volume, e / volume]));
+        }
     }
 
     /// The knobs of the solver.

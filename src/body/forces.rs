@@ -186,7 +186,7 @@ impl DeformableBody {
         let (force, torque) = (finite(quantity, force)?, finite(quantity, torque)?);
         let centre = self.weighted_mean(&self.state.x);
         let point = point.map_or(Ok(centre), |point| finite("point", point))?;
-        let inertia = inertia_about(&centre, &self.state.x, &self.node_masses());
+        let inertia = inertia_about(&centre, &self.state.x, &self.masses);
         let angular = solve_semidefinite(&inertia, &(torque + (point - centre).cross(&force)));
         let linear = force / self.mass();
         let gain = |vertex: usize| {

@@ -17,7 +17,7 @@ const STRAIGHT: f64 = 1.0e-9;
 impl DeformableBody {
     /// Mass \[kg\].
     pub fn mass(&self) -> f64 {
-        self.material.density * self.model.volume
+        self.model.weigh(&self.materials, |material| material.density)
     }
 
     /// Centre of mass \[m\].
@@ -35,14 +35,14 @@ impl DeformableBody {
         if self.body_type == RigidBodyType::KinematicVelocityBased {
             return self.drive.angvel.into();
         }
-        RigidMotion::of(&self.state.x, &self.state.v, &self.node_masses()).spin.into()
+        RigidMotion::of(&self.state.x, &self.state.v, &self.masses).spin.into()
     }
 
     /// Inertia about the centre of mass as the body is now, row by row [kg m²].
     pub fn inertia(&self) -> [[f64; 3]; 3] {
         let centre = self.weighted_mean(&self.state.x);
         // Symmetric: rows are columns.
-        inertia_about(&centre, &self.state.x, &self.node_masses()).into()
+        inertia_about(&centre, &self.state.x, &self.masses).into()
     }
 
     /// Where the body is as a whole: the pose of the rest shape that fits its vertices best, by mass [Horn 1987]. How a rope

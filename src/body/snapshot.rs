@@ -23,7 +23,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 /// Of what is written. Another one is refused: numbers of another layout would be read as something else.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Comes first, so that nothing of another version is read.
 #[derive(Serialize)]
@@ -49,7 +49,14 @@ struct BodyRecord {
     state: DeformableState,
     #[serde(skip)]
     before: Vec<Vec3>,
+    #[serde(skip)]
+    materials: Vec<DeformableMaterial>,
     material: DeformableMaterial,
+    region_materials: Vec<(u32, DeformableMaterial)>,
+    #[serde(skip)]
+    masses: Vec<f64>,
+    #[serde(skip)]
+    node_surfaces: Vec<[f64; 2]>,
     pins: Vec<Pin>,
     held_pins: Vec<Pin>,
     body_type: RigidBodyType,
@@ -216,7 +223,16 @@ impl DeformableBody {
     /// Whether what was read is a body that a step can go on from.
     fn check_read(&mut self) -> Result<(), String> {
         let count = self.vertex_count();
-        self.material.validate().map_err(|error| error.to_string())?;
+        let own = self.region_materials.iter().map(|(_, material)| material);
+        for material in own.chain([&self.material]) {
+            material.validate().map_err(|error| error.to_string())?;
+        }
+        let known = |(tag, _): &(u32, DeformableMaterial)| self.model.region(*tag).is_some();
+        let regions = &self.region_materials;
+        if !(regions.is_sorted_by(|a, b| a.0 < b.0) && regions.iter().all(known)) {
+            return Err("its regions are not those of its model".to_string());
+        }
+        self.distribute_materials();
         self.state.check(count).map_err(str::to_string)?;
         let are_pins = |pins: &[Pin]| {
             pins.is_sorted_by(|a, b| a.node < b.node)

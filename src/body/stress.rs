@@ -52,7 +52,7 @@ impl DeformableStress {
 
 impl DeformableBody {
     fn element_states(&self) -> Vec<ElementState> {
-        element_states(&self.model, self.material(), &self.state.x)
+        element_states(&self.model, &self.materials, &self.state.x)
     }
 
     /// Stress of each tetrahedron, in the order of [`DeformableModel::tetrahedra`](crate::DeformableModel::tetrahedra); damping's is
@@ -133,7 +133,8 @@ impl DeformableBody {
 
     /// Energy \[J\], and forces on nodes \[N\], without damping.
     pub(super) fn elastic_response(&self) -> (f64, Vec<Vec3>) {
-        use crate::fem::elastic_forces::{Evaluation, StiffnessDamping, add_forces};
+        use crate::fem::StiffnessDamping;
+        use crate::fem::elastic_forces::{Evaluation, add_forces};
         let mut force = vec![Vec3::zeros(); self.state.x.len()];
         let (undamped, frame) = (StiffnessDamping::default(), Mat3::identity());
         let at = Evaluation { damping: &undamped, x: &self.state.x, frame: &frame, limit: f64::INFINITY };

@@ -30,7 +30,7 @@ mod reactions;
 mod tests;
 
 pub(crate) use attachments::{SteppedBodies, attached_nodes, attachment_constraints, prescribed_nodes};
-pub(crate) use coefficients::{combined, combined_between};
+pub(crate) use coefficients::{combine_in_place, combine_in_place_between, combined, combined_between};
 pub use hooks::{
     DeformableContactModificationContext, DeformableHooks, DeformablePairFilterContext,
     DeformableSolverContact,

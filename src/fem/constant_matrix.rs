@@ -2,14 +2,16 @@
 //! is put together, and as what it does to a vector, for the one that is not. Sheets, rods and springs
 //! are in it as a multiple of I that is about as stiff as they are along their lengths, without their strain limits.
 
+use super::elements::ElementBlock;
 use super::gradients::{deformation_gradient, scatter_forces};
-use super::model::{DeformableModel, Elements};
+use super::model::Elements;
 use super::smoothing::SmoothingDomains;
 use super::thin_elements::{length_energy, membrane};
 use crate::energy::{ElementEnergy, Lame, with_energy};
 use crate::material::DeformableMaterial;
 use crate::math::lanes::{Lane, LaneMat3};
 use crate::math::{Mat3, Vec3, vectorized};
+use std::ops::Range;
 
 /// The constant matrix of the global step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -29,26 +31,23 @@ pub enum SystemMatrix {
 
 /// Weight of the Laplacian of a material's solids \[Pa\].
 pub(crate) fn laplacian_weight(material: &DeformableMaterial) -> f64 {
-    with_energy!(material, energy => energy.laplacian_weight())
+    weight_of(material, material.lame())
 }
 
-/// Of elements with these of Lamé's constants. Strain limits go with the shape.
 fn weight_of(material: &DeformableMaterial, lame: Lame) -> f64 {
-    let bare = DeformableMaterial { strain_limits: None, ..*material };
-    let material = if lame.mu > 0.0 { material } else { &bare };
     with_energy!(material, lame, energy => energy.laplacian_weight())
 }
 
-/// Calls `add(i, j, K)` with the blocks of every element [N/m].
+/// Calls `add(i, j, K)` with the blocks of every element [N/m], times what `stiffening` says of its material.
 pub(crate) fn add_blocks(
     elements: &Elements<'_>,
     system: SystemMatrix,
+    stiffening: impl Fn(&DeformableMaterial) -> f64,
     mut add: impl FnMut(usize, usize, &Mat3),
 ) {
-    let material = elements.material;
-    elements.model.for_each_energy(material.lame(), |lame, nodes, gradients, volume| {
-        let Lame { mu, lambda } = lame;
-        let weight = weight_of(material, lame);
+    elements.model.for_each_energy(elements.materials, |law, nodes, gradients, volume| {
+        let Lame { mu, lambda } = law.lame;
+        let (weight, stiffening) = (weight_of(law.material, law.lame), stiffening(law.material));
         for (&i, a) in nodes.iter().zip(gradients) {
             for (&j, b) in nodes.iter().zip(gradients) {
                 let block = match system {
@@ -58,17 +57,22 @@ pub(crate) fn add_blocks(
                         shape + a * b.transpose() * lambda
                     }
                 };
-                add(i as usize, j as usize, &(block * volume));
+                add(i as usize, j as usize, &(block * volume * stiffening));
             }
         }
     });
-    add_thin_bounds(elements, |i, j, k| add(i, j, &Mat3::from_diagonal_element(k)));
+    add_thin_bounds(elements, stiffening, |i, j, k| add(i, j, &Mat3::from_diagonal_element(k)));
 }
 
-fn add_thin_bounds(elements: &Elements<'_>, mut add: impl FnMut(usize, usize, f64)) {
-    let Elements { model, material, activation } = elements;
-    let weight = membrane(material).laplacian_weight();
+fn add_thin_bounds(
+    elements: &Elements<'_>,
+    stiffening: impl Fn(&DeformableMaterial) -> f64,
+    mut add: impl FnMut(usize, usize, f64),
+) {
+    let Elements { model, materials, activation } = elements;
     for triangle in &model.triangles {
+        let material = &materials[triangle.region as usize];
+        let weight = membrane(material).laplacian_weight() * stiffening(material);
         for (&i, a) in triangle.nodes.iter().zip(&triangle.gradients) {
             for (&j, b) in triangle.nodes.iter().zip(&triangle.gradients) {
                 add(i as usize, j as usize, weight * triangle.volume * a.dot(b));
@@ -76,7 +80,9 @@ fn add_thin_bounds(elements: &Elements<'_>, mut add: impl FnMut(usize, usize, f6
         }
     }
     for stencil in &model.stencils {
-        let weight = length_energy(stencil, material, *activation).weight;
+        let stiffening = stencil.regions.map(|region| stiffening(&materials[region as usize]));
+        let stiffening = 0.5 * (stiffening[0] + stiffening[1]);
+        let weight = length_energy(stencil, materials, *activation).weight * stiffening;
         for (i, a) in stencil.terms() {
             for (j, b) in stencil.terms() {
                 add(i, j, weight * a * b);
@@ -86,32 +92,45 @@ fn add_thin_bounds(elements: &Elements<'_>, mut add: impl FnMut(usize, usize, f6
 }
 
 /// Subtracts the elastic part of the matrix times `v` from `out`.
-pub(crate) fn subtract_product(elements: &Elements<'_>, system: SystemMatrix, v: &[Vec3], out: &mut [Vec3]) {
-    let Elements { model, material, .. } = elements;
-    let law = |lame: Lame| match system {
-        SystemMatrix::Laplacian => Law::Laplacian(weight_of(material, lame)),
-        SystemMatrix::RestStiffness => Law::Lame(lame),
-    };
-    if model.is_smoothed() {
-        let [shape, volume] = material.lame().split();
-        subtract_domains(&model.domains, law(shape), v, out);
-        if volume.lambda > 0.0 {
-            subtract_domains(&model.volume_domains, law(volume), v, out);
+pub(crate) fn subtract_product(
+    elements: &Elements<'_>,
+    system: SystemMatrix,
+    stiffening: impl Fn(&DeformableMaterial) -> f64,
+    v: &[Vec3],
+    out: &mut [Vec3],
+) {
+    let Elements { model, materials, .. } = elements;
+    for (region, material) in model.regions.iter().zip(*materials) {
+        let stiffening = stiffening(material);
+        let law = |material: &DeformableMaterial, lame: Lame| match system {
+            SystemMatrix::Laplacian => Stress::Laplacian(weight_of(material, lame) * stiffening),
+            SystemMatrix::RestStiffness => {
+                Stress::Lame(Lame { mu: lame.mu * stiffening, lambda: lame.lambda * stiffening })
+            }
+        };
+        if !model.is_smoothed() {
+            let blocks = &model.blocks[region.blocks.clone()];
+            subtract_tetrahedra(blocks, law(material, material.lame()), v, out);
+            continue;
         }
-    } else {
-        subtract_tetrahedra(model, law(material.lame()), v, out);
+        let [shape, volume] = material.lame().split();
+        subtract_domains(&model.domains, region.domains.clone(), law(material, shape), v, out);
+        if volume.lambda > 0.0 {
+            let law = law(&material.without_limits(), volume);
+            subtract_domains(&model.volume_domains, region.patches.clone(), law, v, out);
+        }
     }
-    add_thin_bounds(elements, |i, j, k| out[i] -= v[j] * k);
+    add_thin_bounds(elements, stiffening, |i, j, k| out[i] -= v[j] * k);
 }
 
 /// Stress of a gradient.
 #[derive(Clone, Copy)]
-enum Law {
+enum Stress {
     Laplacian(f64),
     Lame(Lame),
 }
 
-impl Law {
+impl Stress {
     #[inline(always)]
     fn stress(self, G: &LaneMat3) -> LaneMat3 {
         let lame = match self {
@@ -131,16 +150,22 @@ impl Law {
 }
 
 vectorized! {
-fn subtract_tetrahedra[](model: &DeformableModel, law: Law, v: &[Vec3], out: &mut [Vec3]) {
-    for block in &model.blocks {
+fn subtract_tetrahedra[](blocks: &[ElementBlock], law: Stress, v: &[Vec3], out: &mut [Vec3]) {
+    for block in blocks {
         scatter_forces(block, &law.stress(&deformation_gradient(block, v)), out);
     }
 }
 }
 
 vectorized! {
-fn subtract_domains[](domains: &SmoothingDomains, law: Law, v: &[Vec3], out: &mut [Vec3]) {
-    for block in 0..domains.block_count() {
+fn subtract_domains[](
+    domains: &SmoothingDomains,
+    blocks: Range<usize>,
+    law: Stress,
+    v: &[Vec3],
+    out: &mut [Vec3],
+) {
+    for block in blocks {
         let G = domains.deformation_gradient(block, v);
         domains.scatter_forces(block, &law.stress(&G), out);
     }

@@ -2,80 +2,19 @@
 //! Dynamics.
 //!
 //! `E(x) = Σ_e V_e Ψ(F_e)`, `F_e = Σ_a x_a g_aᵀ`, `f_a = −V_e P(F_e) g_a`.
-//!
-//! Stiffness damping adds `β/h·V·(μ‖F − R′S_n‖² + λ/2·(tr(RᵀF) − tr S_n)²)` with the stretch
-//! `S_n = R_nᵀF_n` at the start of the step and R′ = polar(F S_n), so that spinning costs nothing.
 
 use super::elements::ElementBlock;
-use super::gradients::{deformation_gradient, scatter_forces, solid_blocks, solid_gradient, transpose_mul};
+use super::gradients::{deformation_gradient, scatter_forces};
 use super::model::{DeformableModel, Elements};
+use super::regions::Region;
 use super::smoothing::SmoothingDomains;
+use super::stiffness_damping::{StiffnessDamping, damping_response};
 use super::thin_elements;
-use super::thin_elements::ThinDamping;
 use crate::energy::{ElementEnergy, Lame, with_energy};
 use crate::material::DeformableMaterial;
 use crate::math::lanes::{LANES, Lane, LaneMat3};
-use crate::math::polar::polar_rotations;
 use crate::math::{Mat3, Vec3, vectorized};
-
-/// Stiffness damping over one step.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct StiffnessDamping {
-    /// β/h.
-    ratio: f64,
-    /// Stretch of each block at the start of the step; empty without damping.
-    stretches: Vec<LaneMat3>,
-    /// Those of the patches of smoothed bodies.
-    patches: Vec<LaneMat3>,
-    thin: ThinDamping,
-}
-
-impl StiffnessDamping {
-    /// Takes the stretches at `x`, or what they and those `before` amount to in a step of the second order; `beta`
-    /// \[s\], `h` \[s\].
-    pub fn begin(&mut self, model: &DeformableModel, beta: f64, h: f64, x: &[Vec3], before: Option<&[Vec3]>) {
-        self.ratio = beta / h;
-        let mut last = Vec::new();
-        for (stretches, push) in [
-            (&mut self.stretches, push_stretches as fn(&DeformableModel, &[Vec3], &mut Vec<LaneMat3>)),
-            (&mut self.patches, push_patch_stretches),
-        ] {
-            stretches.clear();
-            if beta > 0.0 {
-                push(model, x, stretches);
-                last.clear();
-                before.iter().for_each(|before| push(model, before, &mut last));
-                for (now, last) in stretches.iter_mut().zip(&last) {
-                    *now = now.plus_scaled(&now.minus(last), Lane::splat(1.0 / 3.0));
-                }
-            }
-        }
-        self.thin.begin(&model.triangles, &model.stencils, beta, x, before);
-    }
-}
-
-vectorized! {
-fn push_stretches[](model: &DeformableModel, x: &[Vec3], stretches: &mut Vec<LaneMat3>) {
-    for block in 0..solid_blocks(model) {
-        stretches.push(stretch(&solid_gradient(model, block, x)));
-    }
-}
-}
-
-vectorized! {
-fn push_patch_stretches[](model: &DeformableModel, x: &[Vec3], stretches: &mut Vec<LaneMat3>) {
-    for block in 0..model.volume_domains.block_count() {
-        stretches.push(stretch(&model.volume_domains.deformation_gradient(block, x)));
-    }
-}
-}
-
-#[inline(always)]
-fn stretch(F: &LaneMat3) -> LaneMat3 {
-    let S = transpose_mul(&polar_rotations(F), F);
-    // Symmetric but for roundings.
-    LaneMat3(std::array::from_fn(|k| (S.0[k] + S.at(k / 3, k % 3)) * 0.5))
-}
+use std::ops::Range;
 
 /// Blocks that go through the stages of the element loop together.
 const STAGE: usize = 16;
@@ -91,6 +30,14 @@ pub(crate) struct Elastic {
     pub evaluated: usize,
 }
 
+impl Elastic {
+    fn add(&mut self, other: &Self) {
+        self.energy += other.energy;
+        self.least_trace = self.least_trace.min(other.least_trace);
+        self.evaluated += other.evaluated;
+    }
+}
+
 /// Where and against what energy and forces are evaluated.
 #[derive(Clone, Copy)]
 pub(crate) struct Evaluation<'a> {
@@ -104,18 +51,28 @@ pub(crate) struct Evaluation<'a> {
 
 /// Adds the elastic (and damping) forces \[N\] to `force`.
 pub(crate) fn add_forces(elements: &Elements<'_>, at: &Evaluation<'_>, force: &mut [Vec3]) -> Elastic {
-    let Elements { model, material, .. } = elements;
-    let mut elastic = if model.is_smoothed() {
-        add_smoothed_forces(model, material, at, force)
-    } else {
-        with_energy!(material, material.lame(), energy => {
-            sum_elements(energy, model, material.lame(), at, force)
-        })
-    };
+    let Elements { model, materials, .. } = elements;
+    let mut elastic = Elastic { energy: 0.0, least_trace: 3.0, evaluated: 0 };
+    for (k, (region, material)) in model.regions.iter().zip(*materials).enumerate() {
+        let ratio = at.damping.ratios.get(k).copied().unwrap_or(0.0);
+        let rest = Evaluation { limit: at.limit - elastic.energy, ..*at };
+        if model.is_smoothed() {
+            add_smoothed_forces((model, region), (material, ratio), &rest, &mut elastic, force);
+        } else {
+            let lame = material.lame();
+            let of_region = with_energy!(material, lame, energy => {
+                sum_elements(energy, (model, region), (lame, ratio), &rest, force)
+            });
+            elastic.add(&of_region);
+        }
+        if elastic.energy == f64::INFINITY {
+            return elastic;
+        }
+    }
     if !(model.triangles.is_empty() && model.stencils.is_empty()) {
-        let StiffnessDamping { thin, ratio, .. } = at.damping;
+        let StiffnessDamping { thin, ratios, .. } = at.damping;
         elastic.evaluated += model.triangles.len() + model.stencils.len();
-        elastic.energy += thin_elements::add_forces(elements, thin, *ratio, at.x, force);
+        elastic.energy += thin_elements::add_forces(elements, thin, ratios, at.x, force);
     }
     elastic
 }
@@ -123,37 +80,40 @@ pub(crate) fn add_forces(elements: &Elements<'_>, at: &Evaluation<'_>, force: &m
 vectorized! {
 fn sum_elements[E: ElementEnergy](
     energy: E,
-    model: &DeformableModel,
-    lame: Lame,
+    of: (&DeformableModel, &Region),
+    damped: (Lame, f64),
     at: &Evaluation<'_>,
     force: &mut [Vec3],
 ) -> Elastic {
+    let ((model, region), (lame, ratio)) = (of, damped);
     let Evaluation { damping, x, frame, limit } = *at;
     let mut total = Lane::default();
     let mut least_trace = Lane::splat(3.0);
     // In stages over a few blocks: each loop is short enough for the next block to start in it while
     // the last one waits for its divisions.
     let mut buffer = [LaneMat3::default(); STAGE];
-    for (stage, blocks) in model.blocks.chunks(STAGE).enumerate() {
+    let (start, evaluated) = (region.blocks.start, region.tetrahedra.len());
+    for (stage, blocks) in model.blocks[region.blocks.clone()].chunks(STAGE).enumerate() {
+        let first = start + stage * STAGE;
         for (F, block) in buffer.iter_mut().zip(blocks) {
             *F = deformation_gradient(block, x);
         }
         for (k, (F, block)) in buffer.iter_mut().zip(blocks).enumerate() {
-            if let Some(next) = model.blocks.get((stage + 1) * STAGE + k) {
+            if let Some(next) = model.blocks.get(first + STAGE + k) {
                 prefetch(next);
             }
             let mut response = energy.evaluate(F);
-            if let Some(stretch) = damping.stretches.get(stage * STAGE + k) {
+            if let Some(stretch) = damping.stretches.get(first + k) {
                 let (density, stress) = damping_response(lame, stretch, F, &response.rotation);
-                response.density += density * damping.ratio;
-                response.stress = response.stress.plus_scaled(&stress, Lane::splat(damping.ratio));
+                response.density += density * ratio;
+                response.stress = response.stress.plus_scaled(&stress, Lane::splat(ratio));
             }
             total += response.density * block.volumes;
             least_trace = least_trace.zip(turn_trace(&response.rotation, frame), f64::min);
             *F = response.stress;
         }
         if total.sum() > limit {
-            let evaluated = (stage * STAGE + blocks.len()) * LANES;
+            let evaluated = (first - start + blocks.len()) * LANES;
             return Elastic { energy: f64::INFINITY, least_trace: 3.0, evaluated };
         }
         for (stress, block) in buffer.iter().zip(blocks) {
@@ -161,62 +121,65 @@ fn sum_elements[E: ElementEnergy](
         }
     }
     let least_trace = least_trace.0.into_iter().fold(3.0, f64::min);
-    Elastic { energy: total.sum(), least_trace, evaluated: model.tetrahedra.len() }
+    Elastic { energy: total.sum(), least_trace, evaluated }
 }
 }
 
 /// Shape over edges, volume over patches: every energy, and damping, is the sum of what μ and what λ weigh.
 fn add_smoothed_forces(
-    model: &DeformableModel,
-    material: &DeformableMaterial,
+    (model, region): (&DeformableModel, &Region),
+    (material, ratio): (&DeformableMaterial, f64),
     at: &Evaluation<'_>,
+    elastic: &mut Elastic,
     force: &mut [Vec3],
-) -> Elastic {
+) {
     let [shape, volume] = material.lame().split();
-    let mut elastic = with_energy!(material, shape, energy => {
-        sum_domains(energy, &model.domains, (shape, &at.damping.stretches), at, force)
-    });
-    if volume.lambda > 0.0 && elastic.energy < f64::INFINITY {
-        let bare = DeformableMaterial { strain_limits: None, ..*material };
-        let rest = Evaluation { limit: at.limit - elastic.energy, ..*at };
-        let of_volume = with_energy!(bare, volume, energy => {
-            sum_domains(energy, &model.volume_domains, (volume, &at.damping.patches), &rest, force)
-        });
+    let domains = (&model.domains, region.domains.clone());
+    let damped = (shape, ratio, &at.damping.stretches[..]);
+    let of_shape = with_energy!(material, shape, energy => sum_domains(energy, domains, damped, at, force));
+    elastic.add(&of_shape);
+    if volume.lambda > 0.0 && of_shape.energy < f64::INFINITY {
+        let bare = material.without_limits();
+        let rest = Evaluation { limit: at.limit - of_shape.energy, ..*at };
+        let domains = (&model.volume_domains, region.patches.clone());
+        let damped = (volume, ratio, &at.damping.patches[..]);
+        let of_volume =
+            with_energy!(bare, volume, energy => sum_domains(energy, domains, damped, &rest, force));
         elastic.energy += of_volume.energy;
         elastic.evaluated += of_volume.evaluated;
     }
-    elastic
 }
 
 vectorized! {
 fn sum_domains[E: ElementEnergy](
     energy: E,
-    domains: &SmoothingDomains,
-    damped: (Lame, &[LaneMat3]),
+    of: (&SmoothingDomains, Range<usize>),
+    damped: (Lame, f64, &[LaneMat3]),
     at: &Evaluation<'_>,
     force: &mut [Vec3],
 ) -> Elastic {
-    let Evaluation { damping, x, frame, limit } = *at;
-    let (lame, stretches) = damped;
+    let Evaluation { x, frame, limit, .. } = *at;
+    let ((domains, blocks), (lame, ratio, stretches)) = (of, damped);
+    let first = blocks.start;
     let mut total = Lane::default();
     let mut least_trace = Lane::splat(3.0);
-    for block in 0..domains.block_count() {
+    for block in blocks.clone() {
         let F = domains.deformation_gradient(block, x);
         let mut response = energy.evaluate(&F);
         if let Some(stretch) = stretches.get(block) {
             let (density, stress) = damping_response(lame, stretch, &F, &response.rotation);
-            response.density += density * damping.ratio;
-            response.stress = response.stress.plus_scaled(&stress, Lane::splat(damping.ratio));
+            response.density += density * ratio;
+            response.stress = response.stress.plus_scaled(&stress, Lane::splat(ratio));
         }
         total += response.density * domains.volumes[block];
         least_trace = least_trace.zip(turn_trace(&response.rotation, frame), f64::min);
         domains.scatter_forces(block, &response.stress, force);
         if total.sum() > limit {
-            return Elastic { energy: f64::INFINITY, least_trace: 3.0, evaluated: (block + 1) * LANES };
+            return Elastic { energy: f64::INFINITY, least_trace: 3.0, evaluated: (block + 1 - first) * LANES };
         }
     }
     let least_trace = least_trace.0.into_iter().fold(3.0, f64::min);
-    Elastic { energy: total.sum(), least_trace, evaluated: domains.count }
+    Elastic { energy: total.sum(), least_trace, evaluated: blocks.len() * LANES }
 }
 }
 
@@ -247,23 +210,6 @@ fn prefetch(block: &ElementBlock) {
     let _ = block;
 }
 
-/// Damping's energy density and stress, both per β/h.
-#[inline(always)]
-fn damping_response(
-    Lame { mu, lambda }: Lame,
-    stretch: &LaneMat3,
-    F: &LaneMat3,
-    rotation: &LaneMat3,
-) -> (Lane, LaneMat3) {
-    // R' S_n with S_n symmetric.
-    let turned = polar_rotations(&F.mul_transpose(stretch)).mul(stretch);
-    let deviation = F.minus(&turned);
-    let trace = rotation.dot(F) - (stretch.at(0, 0) + stretch.at(1, 1) + stretch.at(2, 2));
-    let density = deviation.dot(&deviation) * mu + trace * trace * (0.5 * lambda);
-    let stress = deviation.scaled(Lane::splat(2.0 * mu)).plus_scaled(rotation, trace * lambda);
-    (density, stress)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -282,9 +228,17 @@ mod tests {
 
     fn forces(material: &DeformableMaterial, damping: &StiffnessDamping, x: &[Vec3]) -> (f64, Vec<Vec3>) {
         let mut f = vec![Vec3::zeros(); x.len()];
-        let elements = Elements { model: &model(), material, activation: 1.0 };
+        let elements =
+            Elements { model: &model(), materials: std::slice::from_ref(material), activation: 1.0 };
         let elastic = add_forces(&elements, &free(damping, x), &mut f);
         (elastic.energy, f)
+    }
+
+    fn begun(model: &DeformableModel, materials: &[DeformableMaterial], seed: u64) -> StiffnessDamping {
+        let mut damping = StiffnessDamping::default();
+        let elements = Elements { model, materials, activation: 1.0 };
+        damping.begin(&elements, 0.01, &shaken(seed ^ 1, 0.05), None);
+        damping
     }
 
     fn shaken(seed: u64, size: f64) -> Vec<Vec3> {
@@ -304,9 +258,8 @@ mod tests {
             seed in any::<u64>(), beta in prop_oneof![Just(0.0), Just(0.02)], projective in any::<bool>(),
         ) {
             let elasticity = if projective { Elasticity::Projective } else { Elasticity::LinearCorotated };
-            let material = DeformableMaterial::new(1e3, 0.4).elasticity(elasticity);
-            let mut damping = StiffnessDamping::default();
-            damping.begin(&model(), beta, 0.01, &shaken(seed ^ 1, 0.05), None);
+            let material = DeformableMaterial::new(1e3, 0.4).elasticity(elasticity).stiffness_damping(beta);
+            let damping = begun(&model(), &[material], seed);
             let x = shaken(seed, 0.05);
             let direction: Vec<Vec3> = shaken(seed ^ 7, 1.0).iter().zip(&model().rest).map(|(a, b)| a - b).collect();
             let moved = |t: f64| -> Vec<Vec3> { x.iter().zip(&direction).map(|(p, d)| p + d * t).collect() };
@@ -318,14 +271,15 @@ mod tests {
         }
 
         #[test]
-        fn smoothed_forces_are_minus_the_gradient_too(
-            seed in any::<u64>(), beta in prop_oneof![Just(0.0), Just(0.02)], kind in 0usize..4,
+        fn forces_of_regions_are_minus_the_gradient_too_smoothed_or_not(
+            seed in any::<u64>(), beta in prop_oneof![Just(0.0), Just(0.02)], kind in 0usize..4, smoothed in any::<bool>(),
         ) {
-            let material = DeformableMaterial::new(1e3, 0.4).elasticity(Elasticity::ALL[kind]);
-            let model = model().smoothed();
-            let elements = Elements { model: &model, material: &material, activation: 1.0 };
-            let mut damping = StiffnessDamping::default();
-            damping.begin(&model, beta, 0.01, &shaken(seed ^ 1, 0.05), None);
+            let halves = model().painted(|[x, y, _]| 7 * u32::from(x > 0.0) + u32::from(x > 0.0 && y > 0.0));
+            let model = if smoothed { halves.smoothed() } else { halves };
+            let soft = DeformableMaterial::new(1e3, 0.4).elasticity(Elasticity::ALL[kind]);
+            let materials = [soft.stiffness_damping(beta), soft.poisson_ratio(0.0), soft.youngs_modulus(1e2)];
+            let elements = Elements { model: &model, materials: &materials, activation: 1.0 };
+            let damping = begun(&model, &materials, seed);
             let at = |x: &[Vec3]| {
                 let mut f = vec![Vec3::zeros(); x.len()];
                 let elastic = add_forces(&elements, &free(&damping, x), &mut f);
@@ -347,9 +301,8 @@ mod tests {
 
         #[test]
         fn internal_forces_have_no_sum_and_no_moment(seed in any::<u64>()) {
-            let material = DeformableMaterial::new(1e3, 0.3);
-            let mut damping = StiffnessDamping::default();
-            damping.begin(&model(), 0.02, 0.01, &shaken(seed ^ 1, 0.05), None);
+            let material = DeformableMaterial::new(1e3, 0.3).stiffness_damping(0.02);
+            let damping = begun(&model(), &[material], seed);
             let x = shaken(seed, 0.05);
             let (_, f) = forces(&material, &damping, &x);
             let sum = f.iter().fold(Vec3::zeros(), |a, b| a + b);
@@ -388,7 +341,7 @@ mod tests {
         for elasticity in [Elasticity::LinearCorotated, Elasticity::Projective] {
             let material = DeformableMaterial::new(1.0, 0.3).elasticity(elasticity);
             let mut f = vec![Vec3::zeros(); x.len()];
-            let elements = Elements { model: &model, material: &material, activation: 1.0 };
+            let elements = Elements { model: &model, materials: &[material], activation: 1.0 };
             add_forces(&elements, &free(&StiffnessDamping::default(), &x), &mut f);
             for (X, f) in model.rest.iter().zip(&f) {
                 if X.iter().all(|c| c.abs() < 0.29) {

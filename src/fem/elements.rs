@@ -55,6 +55,8 @@ impl ElementBlock {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TriangleElement {
     pub nodes: [u32; 3],
+    /// Place of its region.
+    pub region: u32,
     /// Gradients of the corners' shape functions in the plane of the triangle [1/m]: `F = Σ x_a g_aᵀ`.
     pub gradients: [Vector2<f64>; 3],
     /// Area times thickness \[m³\].
@@ -71,7 +73,7 @@ impl TriangleElement {
         let (l, s) = ((b - a).norm(), along.dot(&(c - a)));
         let gb = Vector2::new(1.0 / l, -s / (l * height));
         let gc = Vector2::new(0.0, 1.0 / height);
-        Self { nodes, gradients: [-(gb + gc), gb, gc], volume: 0.5 * l * height * thickness }
+        Self { nodes, region: 0, gradients: [-(gb + gc), gb, gc], volume: 0.5 * l * height * thickness }
     }
 
     pub fn deformation_gradient(&self, x: &[Vec3]) -> Mat3x2 {
@@ -91,6 +93,8 @@ pub(crate) struct Stencil {
     /// Weight w of `w/2·(‖b‖ − l)²` per pascal of its modulus.
     pub weight: f64,
     pub kind: StencilKind,
+    /// Places of its regions: of what is on either side of a hinge or a bend, else the same twice.
+    pub regions: [u32; 2],
 }
 
 /// A bend at rest below this counts as none: it would have no direction to keep.
@@ -106,6 +110,7 @@ impl Stencil {
             length,
             weight: area / length,
             kind: StencilKind::Stretch,
+            regions: [0; 2],
         }
     }
 
@@ -122,6 +127,7 @@ impl Stencil {
             length: kept_bend(bend.norm(), 1.0),
             weight: 2.0 * inertia / (1.0 / before + 1.0 / after),
             kind: StencilKind::RodBending,
+            regions: [0; 2],
         }
     }
 
@@ -144,6 +150,7 @@ impl Stencil {
             length: kept_bend(bend, edge.norm()),
             weight: thickness.powi(3) / 12.0 / areas,
             kind: StencilKind::SheetBending,
+            regions: [0; 2],
         }
     }
 
@@ -155,6 +162,7 @@ impl Stencil {
             length: 1.0,
             weight: volume,
             kind: StencilKind::Fibre,
+            regions: [0; 2],
         }
     }
 

@@ -4,16 +4,19 @@
 
 mod elements;
 mod patches;
+mod regions;
 mod smoothing;
 mod thin_structure;
 
 mod model;
 #[cfg(feature = "serde-serialize")]
 mod model_file;
+mod solid_elements;
 
 mod gradients;
 
 pub(crate) mod elastic_forces;
+mod stiffness_damping;
 mod stresses;
 mod thin_elements;
 
@@ -26,5 +29,6 @@ pub use constant_matrix::SystemMatrix;
 pub(crate) use frames::{floating_frame, node_rotations, volume};
 pub use model::DeformableModel;
 pub(crate) use model::{Build, Elements};
+pub(crate) use stiffness_damping::StiffnessDamping;
 pub(crate) use stresses::{ElementState, element_states};
 pub(crate) use tangents::add_tangents;

@@ -1,13 +1,11 @@
 //! The constant part of a body: rest mesh, elements, surface, node order.
 
 use super::elements::{ElementBlock, Stencil, TriangleElement};
-use super::patches::patches;
+use super::regions::{Region, VolumeShares, blocks, set_ranges};
 use super::smoothing::SmoothingDomains;
 use super::thin_structure::ThinElements;
-use crate::energy::Lame;
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
-use crate::math::lanes::LANES;
 use crate::mesh::{MeshError, Structure, Surface, TetMesh, node_adjacency, sweep_order};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -20,14 +18,16 @@ pub struct DeformableModel {
     pub(crate) id: u64,
     /// Rest positions \[m\].
     pub(crate) rest: Vec<Vec3>,
-    /// Nodes of each tetrahedron, in the order of `blocks`.
+    /// What shares a material; one at least.
+    pub(crate) regions: Vec<Region>,
+    /// Nodes of each tetrahedron, region by region, in the order of `blocks`.
     pub(crate) tetrahedra: Vec<[u32; 4]>,
-    /// The tetrahedra again, four at a time, as the element loops want them.
+    /// The tetrahedra again, four of a region at a time, as the element loops want them.
     pub(crate) blocks: Vec<ElementBlock>,
     /// In the place of `blocks`, the domains of smoothed tetrahedra: around edges for the shape, patches for the volume.
     pub(crate) domains: SmoothingDomains,
     pub(crate) volume_domains: SmoothingDomains,
-    /// Triangles of sheets.
+    /// Triangles of sheets, region by region.
     pub(crate) triangles: Vec<TriangleElement>,
     /// What keeps lengths: springs, rods, hinges of sheets, muscle fibres.
     pub(crate) stencils: Vec<Stencil>,
@@ -59,7 +59,8 @@ pub struct DeformableModel {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Elements<'a> {
     pub model: &'a DeformableModel,
-    pub material: &'a DeformableMaterial,
+    /// One per region.
+    pub materials: &'a [DeformableMaterial],
     /// Stretch that muscle fibres want to have.
     pub activation: f64,
 }
@@ -81,7 +82,11 @@ pub(crate) enum Build {
 /// a strip of 205 vertices, a third in a cloth of 169 on a floor, four times as long in one of 441 that hangs, nine in one of 1681.
 const SMALL_SHEET: usize = 256;
 
-static NEXT_ID: AtomicU64 = AtomicU64::new(1);
+/// A name that no other model has.
+pub(super) fn next_id() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
 
 impl DeformableModel {
     /// Prepares a mesh for simulation.
@@ -104,7 +109,7 @@ impl DeformableModel {
     /// [`DeformableMaterial::fibre_modulus`](crate::DeformableMaterial::fibre_modulus).
     #[must_use]
     pub fn with_fibres(mut self, direction: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
-        self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
+        self.id = next_id();
         let fibre = |(place, tet): (u32, &[u32; 4])| {
             let middle = tet.iter().map(|&n| self.rest[n as usize]).sum::<Vec3>() / 4.0;
             let along = Vec3::from(direction(middle.into())).try_normalize(0.0);
@@ -121,36 +126,11 @@ impl DeformableModel {
             let tet = self.tetrahedra[*place as usize];
             let block = ElementBlock::new(&[tet], &self.rest);
             let volume = crate::mesh::signed_volume(&tet.map(|n| self.rest[n as usize]));
-            self.stencils.push(Stencil::fibre(tet, &block.shape_gradients(0), volume, along));
+            let region = self.regions.partition_point(|region| region.tetrahedra.end <= *place as usize);
+            let fibre = Stencil::fibre(tet, &block.shape_gradients(0), volume, along);
+            self.stencils.push(Stencil { regions: [region as u32; 2], ..fibre });
         }
         self.fibres.extend_from_slice(fibres);
-    }
-
-    /// The same with its tetrahedra smoothed: over their edges in what resists a change of shape [Liu et al. 2009; He et al.
-    /// 2013], over patches of about five in what resists a change of volume [Souza Neto et al. 2005]. They do not
-    /// lock, in bending and near incompressibility, as linear tetrahedra do, whose stiffness falls to the
-    /// true one only with the mesh. Elements cost three times as much, and the factor is twice as large:
-    /// worth it wherever the mesh is coarse, with two cells across and more. What it gains is in `docs/accuracy.md`.
-    #[must_use]
-    pub fn smoothed(mut self) -> Self {
-        if !self.is_solid() {
-            return self;
-        }
-        self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
-        let tetrahedra = self.shaped_tetrahedra();
-        let volumes: Vec<f64> = tetrahedra.clone().map(|(_, _, volume)| volume).collect();
-        let patches = patches(&self.tetrahedra[..volumes.len()], &volumes);
-        let around_edges = SmoothingDomains::around_edges(tetrahedra.clone());
-        let of_patches = SmoothingDomains::of_patches(tetrahedra, &patches);
-        (self.domains, self.volume_domains) = (around_edges, of_patches);
-        let mut domains: Vec<Vec<u32>> = Vec::new();
-        self.domains.for_each(|nodes, _, _| domains.push(nodes.to_vec()));
-        self.volume_domains.for_each(|nodes, _, _| domains.push(nodes.to_vec()));
-        let stencils = self.stencils.iter().map(|s| &s.nodes[..]);
-        let thin = self.triangles.iter().map(|t| &t.nodes[..]).chain(stencils);
-        let solid = self.tetrahedra.iter().map(|t| &t[..]).chain(domains.iter().map(|p| &p[..]));
-        self.coupling = node_adjacency(solid.chain(thin), self.rest.len());
-        self
     }
 
     /// Of a structure in which every vertex has mass.
@@ -164,33 +144,37 @@ impl DeformableModel {
         }
         let rest: Vec<Vec3> = vertex_of_node.iter().map(|&v| at_rest[v as usize]).collect();
         let node = |v: u32| node_of_vertex[v as usize];
-        let mut tetrahedra: Vec<[u32; 4]> = structure.tetrahedra.iter().map(|t| t.map(node)).collect();
+        let mut shares = VolumeShares::new(structure.all_regions(), rest.len());
+        let tagged = structure.tetrahedra.iter().zip(&structure.regions);
+        let mut placed: Vec<(u32, [u32; 4])> =
+            tagged.map(|(tet, tag)| (shares.place(*tag), tet.map(node))).collect();
         // Neighbouring elements touch neighbouring memory.
-        tetrahedra.sort_by_key(|t| t.iter().sum::<u32>());
-        let mut node_volumes = vec![0.0; rest.len()];
-        let mut volume = 0.0;
-        for tet in &tetrahedra {
-            let own = crate::mesh::signed_volume(&tet.map(|n| rest[n as usize]));
-            tet.iter().for_each(|&n| node_volumes[n as usize] += own / 4.0);
-            volume += own;
+        placed.sort_by_key(|(region, tet)| (*region, tet.iter().sum::<u32>()));
+        for (region, tet) in &placed {
+            shares.add(*region, tet, crate::mesh::signed_volume(&tet.map(|n| rest[n as usize])));
         }
-        let thin = ThinElements::new(&structure, node, &tetrahedra, &rest, &mut node_volumes);
-        volume += thin.volume;
+        let thin = ThinElements::new(&structure, node, &placed, &rest, &mut shares);
+        let (mut regions, node_volumes) = shares.finish();
+        set_ranges(&mut regions, placed.iter().map(|(region, _)| *region), |region| &mut region.tetrahedra);
+        set_ranges(&mut regions, thin.triangles.iter().map(|t| t.region), |region| &mut region.triangles);
+        let tetrahedra: Vec<[u32; 4]> = placed.into_iter().map(|(_, tet)| tet).collect();
+        let solid: &[[u32; 4]] = if structure.is_network { &[] } else { &tetrahedra };
+        let blocks = blocks(&mut regions, solid, &rest);
         let sheets: Vec<[u32; 3]> = thin.triangles.iter().map(|t| t.nodes).collect();
         let surface = Surface::new(&tetrahedra, &sheets, &thin.segments, &rest);
         let low = rest.iter().fold(rest[0], |a, b| a.inf(b));
         let high = rest.iter().fold(rest[0], |a, b| a.sup(b));
-        let solid: &[[u32; 4]] = if structure.is_network { &[] } else { &tetrahedra };
         let thin_nodes = thin.triangles.iter().map(|t| &t.nodes[..]);
         let thin_nodes = thin_nodes.chain(thin.stencils.iter().map(|s| &s.nodes[..]));
         let adjacency = node_adjacency(tetrahedra.iter().map(|t| &t[..]).chain(thin_nodes), rest.len());
         Self {
-            id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
-            blocks: solid.chunks(LANES).map(|c| ElementBlock::new(c, &rest)).collect(),
+            id: next_id(),
+            blocks,
             frame_sources: frame_sources(&adjacency, solid),
             coupling: adjacency.clone(),
             adjacency,
-            volume,
+            volume: regions.iter().map(|region| region.volume).sum(),
+            regions,
             size: (high - low).norm(),
             rest,
             domains: SmoothingDomains::default(),
@@ -211,39 +195,6 @@ impl DeformableModel {
     /// Whether it is a solid, altogether or in part.
     pub fn is_solid(&self) -> bool {
         !self.blocks.is_empty()
-    }
-
-    /// Nodes, gradients of the shape functions, and volumes of the tetrahedra that have an energy.
-    fn shaped_tetrahedra(&self) -> impl Iterator<Item = ([u32; 4], [Vec3; 4], f64)> + Clone + '_ {
-        let solid = self.tetrahedra.iter().enumerate().take(LANES * self.blocks.len());
-        solid.map(|(e, tet)| {
-            let block = &self.blocks[e / LANES];
-            (*tet, block.shape_gradients(e % LANES), block.volumes.0[e % LANES])
-        })
-    }
-
-    /// Calls `with` with the nodes, the gradients of their shape functions [1/m] and the volume \[m³\] of every
-    /// solid element: tetrahedra, or the domains around edges that stand for them.
-    pub(crate) fn for_each_solid(&self, mut with: impl FnMut(&[u32], &[Vec3], f64)) {
-        if self.is_smoothed() {
-            return self.domains.for_each(with);
-        }
-        for (nodes, gradients, volume) in self.shaped_tetrahedra() {
-            with(&nodes, &gradients, volume);
-        }
-    }
-
-    /// Calls `with` as [`DeformableModel::for_each_solid`], with what of Lamé's constants the energy of each element has: both, or
-    /// around edges μ and in patches λ.
-    pub(crate) fn for_each_energy(&self, lame: Lame, mut with: impl FnMut(Lame, &[u32], &[Vec3], f64)) {
-        if !self.is_smoothed() {
-            return self.for_each_solid(|nodes, gradients, volume| with(lame, nodes, gradients, volume));
-        }
-        let [shape, volume] = lame.split();
-        self.domains.for_each(|nodes, gradients, own| with(shape, nodes, gradients, own));
-        if lame.lambda > 0.0 {
-            self.volume_domains.for_each(|nodes, gradients, own| with(volume, nodes, gradients, own));
-        }
     }
 
     /// Whether its tetrahedra are smoothed.

@@ -9,6 +9,7 @@
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lane, LaneMat3};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// All domains of a body, four side by side.
 #[derive(Clone, Debug, Default)]
@@ -98,6 +99,17 @@ impl SmoothingDomains {
         domains
     }
 
+    /// Adds other domains; returns their blocks.
+    pub fn append(&mut self, other: Self) -> Range<usize> {
+        let (first, corners) = (self.volumes.len(), self.corners.len() as u32);
+        self.starts.pop();
+        self.starts.extend(other.starts.iter().map(|start| start + corners));
+        self.corners.extend(other.corners);
+        self.volumes.extend(other.volumes);
+        self.count += other.count;
+        first..self.volumes.len()
+    }
+
     pub fn block_count(&self) -> usize {
         self.volumes.len()
     }
@@ -107,11 +119,13 @@ impl SmoothingDomains {
         &self.corners[self.starts[block] as usize..self.starts[block + 1] as usize]
     }
 
-    /// Calls `with` with the nodes of every domain, the gradients of their shape functions, and its volume.
-    pub fn for_each(&self, mut with: impl FnMut(&[u32], &[Vec3], f64)) {
+    /// Calls `with` with the nodes of every domain of these blocks, the gradients of their shape functions, and its volume.
+    pub fn for_each(&self, blocks: Range<usize>, mut with: impl FnMut(&[u32], &[Vec3], f64)) {
         let (mut nodes, mut gradients) = (Vec::new(), Vec::new());
-        for p in 0..self.count {
-            let (block, lane) = (p / LANES, p % LANES);
+        for (block, lane) in blocks.flat_map(|block| (0..LANES).map(move |lane| (block, lane))) {
+            if self.volumes[block].0[lane] == 0.0 {
+                continue;
+            }
             nodes.clear();
             gradients.clear();
             for corner in self.corners(block) {

@@ -4,7 +4,7 @@
 //! of its patch, of volume: together they are worth what the domains are, `Σ V_e σ_e = Σ V_d σ_d`.
 
 use super::model::DeformableModel;
-use super::patches::patches;
+use super::regions::Region;
 use crate::energy::{ElementEnergy, Lame, with_energy};
 use crate::material::DeformableMaterial;
 use crate::math::lanes::{LANES, LaneMat3};
@@ -27,36 +27,48 @@ pub(crate) struct ElementState {
 /// Of each tetrahedron, in the order of the model's.
 pub(crate) fn element_states(
     model: &DeformableModel,
-    material: &DeformableMaterial,
+    materials: &[DeformableMaterial],
     x: &[Vec3],
 ) -> Vec<ElementState> {
     if !model.is_solid() {
         return Vec::new();
     }
     let mut states: Vec<ElementState> = model.tetrahedra.iter().map(|tet| at_rest(model, tet, x)).collect();
-    if model.is_smoothed() {
-        let [shape, volume] = material.lame().split();
-        let mut names = HashMap::new();
-        let mut name = |a: u32, b: u32| {
-            let next = names.len();
-            *names.entry([a.min(b), a.max(b)]).or_insert(next)
-        };
-        const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
-        let edges: Vec<_> = model.tetrahedra.iter().map(|t| EDGES.map(|[i, j]| name(t[i], t[j]))).collect();
-        add_smoothed(material, shape, &edges, &mut states);
-        let volumes: Vec<f64> = states.iter().map(|state| state.volume).collect();
-        let own = patches(&model.tetrahedra, &volumes);
-        let own: Vec<[usize; 1]> = own.into_iter().map(|patch| [patch as usize]).collect();
-        add_smoothed(&DeformableMaterial { strain_limits: None, ..*material }, volume, &own, &mut states);
-    } else {
-        let gradients: Vec<Mat3> = states.iter().map(|state| state.F).collect();
-        for (state, (density, stress)) in
-            states.iter_mut().zip(responses(material, material.lame(), &gradients))
-        {
-            (state.energy, state.stress) = (density * state.volume, stress);
+    for (region, material) in model.regions.iter().zip(materials) {
+        let own = &mut states[region.tetrahedra.clone()];
+        if model.is_smoothed() {
+            add_domains(model, region, material, own);
+        } else {
+            let gradients: Vec<Mat3> = own.iter().map(|state| state.F).collect();
+            for (state, (density, stress)) in
+                own.iter_mut().zip(responses(material, material.lame(), &gradients))
+            {
+                (state.energy, state.stress) = (density * state.volume, stress);
+            }
         }
     }
     states
+}
+
+/// What the domains of a region contribute to its tetrahedra.
+fn add_domains(
+    model: &DeformableModel,
+    region: &Region,
+    material: &DeformableMaterial,
+    states: &mut [ElementState],
+) {
+    let [shape, volume] = material.lame().split();
+    let mut names = HashMap::new();
+    let mut name = |a: u32, b: u32| {
+        let next = names.len();
+        *names.entry([a.min(b), a.max(b)]).or_insert(next)
+    };
+    const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+    let tetrahedra = &model.tetrahedra[region.tetrahedra.clone()];
+    let edges: Vec<_> = tetrahedra.iter().map(|t| EDGES.map(|[i, j]| name(t[i], t[j]))).collect();
+    add_smoothed(material, shape, &edges, states);
+    let own = model.patches_of(region).into_iter().map(|patch| [patch as usize]);
+    add_smoothed(&material.without_limits(), volume, &own.collect::<Vec<_>>(), states);
 }
 
 fn at_rest(model: &DeformableModel, tet: &[u32; 4], x: &[Vec3]) -> ElementState {

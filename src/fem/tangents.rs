@@ -13,32 +13,35 @@ pub(crate) fn add_tangents(
     elements: &Elements<'_>,
     x: &[Vec3],
     projected: bool,
+    stiffening: impl Fn(&DeformableMaterial) -> f64,
     mut add: impl FnMut(usize, usize, &Mat3),
 ) {
-    let Elements { model, material, activation } = elements;
+    let Elements { model, materials, activation } = elements;
     let kept = |stiffness: f64| if projected { stiffness.max(0.0) } else { stiffness };
     let mut sides = Vec::new();
-    // As in the forces, strain limits go with the shape.
-    let bare = DeformableMaterial { strain_limits: None, ..**material };
-    model.for_each_energy(material.lame(), |lame, nodes, gradients, volume| {
-        let material = if lame.mu > 0.0 { material } else { &bare };
+    model.for_each_energy(materials, |law, nodes, gradients, volume| {
+        let (material, lame) = (law.material, law.lame);
         let F =
             nodes.iter().zip(gradients).fold(Mat3::zeros(), |F, (&n, g)| F + x[n as usize] * g.transpose());
         let modes: [Mode; 9] = with_energy!(material, lame, energy => modes(&F, |s| energy.principal(s)));
         sides.clear();
         sides.extend(modes.iter().flat_map(|m| gradients.iter().map(|g| m.shape * g)));
-        add_products(nodes, &modes.map(|m| kept(m.stiffness) * volume), &sides, &mut add);
+        let scale = volume * stiffening(material);
+        add_products(nodes, &modes.map(|m| kept(m.stiffness) * scale), &sides, &mut add);
     });
-    let sheet = membrane(material);
     for triangle in &model.triangles {
-        let modes: [MembraneMode; 6] = sheet.modes(&triangle.deformation_gradient(x));
+        let material = &materials[triangle.region as usize];
+        let modes: [MembraneMode; 6] = membrane(material).modes(&triangle.deformation_gradient(x));
         sides.clear();
         sides.extend(modes.iter().flat_map(|m| triangle.gradients.map(|g| m.shape * g)));
-        let weights = modes.map(|m| kept(m.stiffness) * triangle.volume);
+        let scale = triangle.volume * stiffening(material);
+        let weights = modes.map(|m| kept(m.stiffness) * scale);
         add_products(&triangle.nodes, &weights, &sides, &mut add);
     }
     for stencil in &model.stencils {
-        let mut K = length_energy(stencil, material, *activation).tangent(&stencil.vector(x));
+        let sides = stencil.regions.map(|region| stiffening(&materials[region as usize]));
+        let tangent = length_energy(stencil, materials, *activation).tangent(&stencil.vector(x));
+        let mut K = tangent * (0.5 * (sides[0] + sides[1]));
         if projected {
             K = semidefinite(&K);
         }
@@ -77,13 +80,14 @@ mod tests {
     use super::super::model::DeformableModel;
     use super::*;
     use crate::energy::Elasticity;
-    use crate::fem::elastic_forces::{Evaluation, StiffnessDamping, add_forces};
+    use crate::fem::StiffnessDamping;
+    use crate::fem::elastic_forces::{Evaluation, add_forces};
     use crate::mesh::{Structure, TetMesh};
     use nalgebra::DMatrix;
     use proptest::prelude::*;
 
     /// A block with a skin, a rope and muscles, and a network: every kind of element.
-    fn models() -> [DeformableModel; 3] {
+    fn models() -> Vec<DeformableModel> {
         let block = TetMesh::cuboid([0.1; 3], [1, 1, 2]).unwrap();
         let faces = [[0, 1, 2]];
         let mixed = Structure::solid(&block).with_sheet(&faces, 0.01).unwrap();
@@ -93,11 +97,13 @@ mod tests {
         let arch: Vec<[f64; 3]> =
             [-0.2, 0.0, 0.2].iter().flat_map(|&z| [-0.2, 0.1].map(|x: f64| [x, x * x + z * z, z])).collect();
         let shell = Structure::sheet(arch, &[[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]], 0.01);
-        [
+        let whole = [
             DeformableModel::new(&block).smoothed(),
             DeformableModel::from_structure(&mixed).unwrap().with_fibres(|_| [1.0, 0.5, 0.0]),
             DeformableModel::from_structure(&shell.unwrap()).unwrap(),
-        ]
+        ];
+        let in_regions = whole.clone().map(|model| model.painted(|[x, _, z]| u32::from(x + z > 0.0)));
+        whole.into_iter().chain(in_regions).collect()
     }
 
     fn forces(elements: &Elements<'_>, x: &[Vec3]) -> Vec<Vec3> {
@@ -116,14 +122,16 @@ mod tests {
         ) {
             for model in models() {
                 let material = DeformableMaterial::new(1e3, 0.3).fibre_modulus(500.0).elasticity(Elasticity::ALL[kind]);
-                let elements = Elements { model: &model, material: &material, activation: 0.8 };
+                let materials = [material, material.youngs_modulus(2e2).poisson_ratio(0.1)];
+                let materials = &materials[..model.regions().len()];
+                let elements = Elements { model: &model, materials, activation: 0.8 };
                 let x: Vec<Vec3> = model.rest.iter().enumerate().map(|(i, X)| {
                     X + Vec3::from_fn(|c, _| shakes[(3 * i + c) % shakes.len()])
                 }).collect();
                 let n = 3 * x.len();
                 let (mut K, mut projected) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
                 for (out, project) in [(&mut K, false), (&mut projected, true)] {
-                    add_tangents(&elements, &x, project, |i, j, block| {
+                    add_tangents(&elements, &x, project, |_| 1.0, |i, j, block| {
                         let mut part = out.view_mut((3 * i, 3 * j), (3, 3));
                         part += block;
                     });

@@ -2,6 +2,7 @@
 
 use super::elements::{Stencil, TriangleElement};
 use super::model::Elements;
+use super::regions::Region;
 use crate::energy::membrane::{Membrane, polar_factor};
 use crate::energy::stencil::{LengthEnergy, StencilKind};
 use crate::material::DeformableMaterial;
@@ -20,13 +21,13 @@ impl ThinDamping {
         &mut self,
         triangles: &[TriangleElement],
         stencils: &[Stencil],
-        beta: f64,
+        is_damped: bool,
         x: &[Vec3],
         before: Option<&[Vec3]>,
     ) {
         self.stretches.clear();
         self.lengths.clear();
-        if beta > 0.0 {
+        if is_damped {
             let stretch = |t: &TriangleElement, x: &[Vec3]| {
                 let F = t.deformation_gradient(x);
                 let S = polar_factor(&F).tr_mul(&F);
@@ -49,8 +50,18 @@ pub(super) fn membrane(material: &DeformableMaterial) -> Membrane {
     Membrane::new(material.lame(), material.strain_limits, material.limit_weight())
 }
 
-/// What the weight per modulus of a stencil is to be multiplied by \[Pa\].
-fn modulus(kind: StencilKind, material: &DeformableMaterial) -> f64 {
+/// What the weight per modulus of a stencil is to be multiplied by \[Pa\]. Two sides that differ share a moment, and each
+/// has half of the bend: they are as stiff as two springs in a row.
+fn modulus(stencil: &Stencil, materials: &[DeformableMaterial]) -> f64 {
+    let [a, b] = stencil.regions.map(|region| &materials[region as usize]);
+    let first = modulus_of(stencil.kind, a);
+    if stencil.regions[0] == stencil.regions[1] {
+        return first;
+    }
+    2.0 / (1.0 / first + 1.0 / modulus_of(stencil.kind, b))
+}
+
+fn modulus_of(kind: StencilKind, material: &DeformableMaterial) -> f64 {
     let nu = material.poisson_ratio;
     match kind {
         StencilKind::Stretch | StencilKind::RodBending => material.youngs_modulus,
@@ -62,10 +73,11 @@ fn modulus(kind: StencilKind, material: &DeformableMaterial) -> f64 {
 /// What keeps the length of a stencil of a body.
 pub(super) fn length_energy(
     stencil: &Stencil,
-    material: &DeformableMaterial,
+    materials: &[DeformableMaterial],
     activation: f64,
 ) -> LengthEnergy {
-    let weight = stencil.weight * modulus(stencil.kind, material);
+    let weight = stencil.weight * modulus(stencil, materials);
+    let material = &materials[stencil.regions[0] as usize];
     let is_stretch = stencil.kind == StencilKind::Stretch;
     let limits = material
         .strain_limits
@@ -75,19 +87,52 @@ pub(super) fn length_energy(
     LengthEnergy { length, weight, limits }
 }
 
-/// Adds the forces \[N\] of a body's thin elements at positions `x`; returns their energy \[J\]. `ratio` is β/h.
+/// Adds the forces \[N\] of a body's thin elements at positions `x`; returns their energy \[J\]. `ratios` are β/h of the regions.
 pub(super) fn add_forces(
     elements: &Elements<'_>,
     damping: &ThinDamping,
-    ratio: f64,
+    ratios: &[f64],
     x: &[Vec3],
     force: &mut [Vec3],
 ) -> f64 {
-    let Elements { model, material, activation } = elements;
-    let sheet = membrane(material);
-    let lame = material.lame();
+    let Elements { model, materials, activation } = elements;
     let mut energy = 0.0;
-    for (k, triangle) in model.triangles.iter().enumerate() {
+    for (k, (region, material)) in model.regions.iter().zip(*materials).enumerate() {
+        let ratio = ratios.get(k).copied().unwrap_or(0.0);
+        energy += add_triangles(region, elements, material, (damping, ratio), x, force);
+    }
+    for (k, stencil) in model.stencils.iter().enumerate() {
+        let length_energy = length_energy(stencil, materials, *activation);
+        let b = stencil.vector(x);
+        let (mut own, mut pull) = length_energy.response(&b);
+        if let Some(&length) = damping.lengths.get(k) {
+            let [one, other] = stencil.regions.map(|region| ratios[region as usize]);
+            let weight = 0.5 * (one + other) * length_energy.weight;
+            let damper = LengthEnergy { length, weight, limits: None };
+            let (damped, drag) = damper.response(&b);
+            (own, pull) = (own + damped, pull + drag);
+        }
+        energy += own;
+        for (n, c) in stencil.terms() {
+            force[n] -= pull * c;
+        }
+    }
+    energy
+}
+
+/// Those of the triangles of a region.
+fn add_triangles(
+    region: &Region,
+    elements: &Elements<'_>,
+    material: &DeformableMaterial,
+    (damping, ratio): (&ThinDamping, f64),
+    x: &[Vec3],
+    force: &mut [Vec3],
+) -> f64 {
+    let (sheet, lame) = (membrane(material), material.lame());
+    let mut energy = 0.0;
+    for k in region.triangles.clone() {
+        let triangle = &elements.model.triangles[k];
         let F = triangle.deformation_gradient(x);
         let response = sheet.evaluate(&F);
         let (mut density, mut stress) = (response.density, response.stress);
@@ -100,20 +145,6 @@ pub(super) fn add_forces(
         energy += triangle.volume * density;
         for (&n, g) in triangle.nodes.iter().zip(&triangle.gradients) {
             force[n as usize] -= stress * g * triangle.volume;
-        }
-    }
-    for (k, stencil) in model.stencils.iter().enumerate() {
-        let length_energy = length_energy(stencil, material, *activation);
-        let b = stencil.vector(x);
-        let (mut own, mut pull) = length_energy.response(&b);
-        if let Some(&length) = damping.lengths.get(k) {
-            let damper = LengthEnergy { length, weight: ratio * length_energy.weight, limits: None };
-            let (damped, drag) = damper.response(&b);
-            (own, pull) = (own + damped, pull + drag);
-        }
-        energy += own;
-        for (n, c) in stencil.terms() {
-            force[n] -= pull * c;
         }
     }
     energy

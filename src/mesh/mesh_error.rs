@@ -121,6 +121,14 @@ pub enum MeshError {
         /// Its longest edge \[m\].
         edge: f64,
     },
+    /// Not one region per element.
+    #[error("{regions} regions for {elements} elements")]
+    RegionCount {
+        /// How many regions were given.
+        regions: usize,
+        /// How many elements there are.
+        elements: usize,
+    },
     /// A vertex that no tetrahedron uses has no mass.
     #[error("vertex {vertex} belongs to no tetrahedron")]
     UnusedVertex {

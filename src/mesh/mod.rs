@@ -18,6 +18,7 @@ mod tet_mesh;
 pub use mesh_error::MeshError;
 pub(crate) use ordering::{node_adjacency, sweep_order};
 pub use repair::{SurfaceFault, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport};
+pub(crate) use structure::Rod;
 pub use structure::Structure;
 pub(crate) use surface::{NONE, Surface, point_normals, sorted_face, sorted_faces};
 pub use tet_mesh::TetMesh;

@@ -2,7 +2,7 @@
 
 use super::mesh_error::MeshError;
 use super::structure_check::check_size;
-use super::tet_mesh::{TetMesh, check_finite};
+use super::tet_mesh::{TetMesh, check_finite, middle};
 
 /// Tetrahedra, sheets, rods and springs over shared vertices, in any mix: a body of several materials' shapes.
 /// Cross-sections make stiffness and mass of what is thin follow from the same pascals and kilograms per
@@ -25,6 +25,8 @@ use super::tet_mesh::{TetMesh, check_finite};
 pub struct Structure {
     pub(crate) vertices: Vec<[f64; 3]>,
     pub(crate) tetrahedra: Vec<[u32; 4]>,
+    /// The region of each tetrahedron.
+    pub(crate) regions: Vec<u32>,
     /// The tetrahedra give mass and a surface; their edges are springs that take the place of the solid.
     pub(crate) is_network: bool,
     pub(crate) sheets: Vec<SheetTriangle>,
@@ -37,6 +39,7 @@ pub struct Structure {
 pub(crate) struct SheetTriangle {
     pub corners: [u32; 3],
     pub thickness: f64,
+    pub region: u32,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -44,6 +47,8 @@ pub(crate) struct SheetTriangle {
 pub(crate) struct Rod {
     pub points: Vec<u32>,
     pub radius: f64,
+    /// Of each segment.
+    pub regions: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,13 +57,19 @@ pub(crate) struct Spring {
     pub ends: [u32; 2],
     /// Cross-section \[m²\].
     pub area: f64,
+    pub region: u32,
 }
 
 impl Structure {
     /// The tetrahedra of a mesh.
     #[must_use]
     pub fn solid(mesh: &TetMesh) -> Self {
-        Self { vertices: mesh.vertices().to_vec(), tetrahedra: mesh.tetrahedra().to_vec(), ..Self::default() }
+        Self {
+            vertices: mesh.vertices().to_vec(),
+            tetrahedra: mesh.tetrahedra().to_vec(),
+            regions: mesh.regions().to_vec(),
+            ..Self::default()
+        }
     }
 
     /// A mass–spring network: the edges of a mesh as springs of `E V/l²` each, V the volume of the tetrahedra
@@ -146,7 +157,7 @@ impl Structure {
         for (triangle, corners) in (first..).zip(triangles) {
             self.check_triangle(triangle, corners)?;
         }
-        self.sheets.extend(triangles.iter().map(|&corners| SheetTriangle { corners, thickness }));
+        self.sheets.extend(triangles.iter().map(|&corners| SheetTriangle { corners, thickness, region: 0 }));
         self.check_sheets()?;
         Ok(self)
     }
@@ -156,7 +167,8 @@ impl Structure {
     /// # Errors
     /// As [`Structure::rod`].
     pub fn with_rod(mut self, points: Vec<u32>, radius: f64) -> Result<Self, MeshError> {
-        let rod = Rod { points, radius };
+        let regions = vec![0; points.len().saturating_sub(1)];
+        let rod = Rod { points, radius, regions };
         self.check_rod(&rod, self.size())?;
         self.rods.push(rod);
         Ok(self)
@@ -183,10 +195,31 @@ impl Structure {
     /// # Errors
     /// Ends that are no vertices or in one place, a bad area.
     pub fn with_spring(mut self, ends: [u32; 2], area: f64) -> Result<Self, MeshError> {
-        let spring = Spring { ends, area };
+        let spring = Spring { ends, area, region: 0 };
         self.check_spring(&spring, self.size())?;
         self.springs.push(spring);
         Ok(self)
+    }
+
+    /// The same with the region of each tetrahedron, triangle, segment of a rod and spring by the place \[m\] of its middle, as
+    /// [`TetMesh::painted`].
+    #[must_use]
+    pub fn painted(mut self, region: impl Fn([f64; 3]) -> u32) -> Self {
+        let vertices = &self.vertices;
+        let region = |corners: &[u32]| region(middle(vertices, corners));
+        self.regions = self.tetrahedra.iter().map(|tet| region(tet)).collect();
+        self.sheets.iter_mut().for_each(|sheet| sheet.region = region(&sheet.corners));
+        self.rods.iter_mut().for_each(|rod| rod.regions = rod.points.windows(2).map(region).collect());
+        self.springs.iter_mut().for_each(|spring| spring.region = region(&spring.ends));
+        self
+    }
+
+    /// Every region that an element is in.
+    pub(crate) fn all_regions(&self) -> impl Iterator<Item = u32> + '_ {
+        let of_rods = self.rods.iter().flat_map(|rod| &rod.regions);
+        let listed = self.regions.iter().chain(of_rods).copied();
+        let of_sheets = self.sheets.iter().map(|sheet| sheet.region);
+        listed.chain(of_sheets).chain(self.springs.iter().map(|spring| spring.region))
     }
 
     /// Rest positions \[m\], one per vertex.

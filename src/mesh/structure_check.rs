@@ -20,6 +20,7 @@ const THIN: f64 = 1.0e-6;
 pub(super) struct Unchecked {
     vertices: Vec<[f64; 3]>,
     tetrahedra: Vec<[u32; 4]>,
+    regions: Vec<u32>,
     is_network: bool,
     sheets: Vec<SheetTriangle>,
     rods: Vec<Rod>,
@@ -31,10 +32,13 @@ impl TryFrom<Unchecked> for Structure {
     type Error = MeshError;
 
     fn try_from(read: Unchecked) -> Result<Self, MeshError> {
-        let Unchecked { vertices, tetrahedra, is_network, sheets, rods, springs } = read;
+        let Unchecked { vertices, tetrahedra, regions, is_network, sheets, rods, springs } = read;
         check_finite(&vertices)?;
         check_tetrahedra(&vertices, &tetrahedra)?;
-        let structure = Self { vertices, tetrahedra, is_network, sheets, rods, springs };
+        if regions.len() != tetrahedra.len() {
+            return Err(MeshError::RegionCount { regions: regions.len(), elements: tetrahedra.len() });
+        }
+        let structure = Self { vertices, tetrahedra, regions, is_network, sheets, rods, springs };
         for (triangle, sheet) in structure.sheets.iter().enumerate() {
             check_size("thickness", sheet.thickness)?;
             structure.check_triangle(triangle, &sheet.corners)?;
@@ -90,6 +94,12 @@ impl Structure {
         check_size("radius", rod.radius)?;
         if rod.points.len() < 2 {
             return Err(MeshError::Empty);
+        }
+        if rod.regions.len() + 1 != rod.points.len() {
+            return Err(MeshError::RegionCount {
+                regions: rod.regions.len(),
+                elements: rod.points.len() - 1,
+            });
         }
         rod.points.windows(2).try_for_each(|ends| self.check_ends([ends[0], ends[1]], size))
     }

@@ -22,6 +22,10 @@ pub struct TetMesh {
     vertices: Vec<[f64; 3]>,
     tetrahedra: Vec<[u32; 4]>,
     volumes: Vec<f64>,
+    /// The region of each tetrahedron.
+    regions: Vec<u32>,
+    /// Regions that have names.
+    names: Vec<(u32, String)>,
 }
 
 impl TetMesh {
@@ -42,7 +46,50 @@ impl TetMesh {
             return Err(MeshError::UnusedVertex { vertex });
         }
         check_extent(&vertices)?;
-        Ok(Self { vertices, tetrahedra, volumes })
+        let regions = vec![0; tetrahedra.len()];
+        Ok(Self { vertices, tetrahedra, volumes, regions, names: Vec::new() })
+    }
+
+    /// The same with a region for each tetrahedron, in their order: any numbers. A body takes a material for each, see
+    /// [`DeformableBodyBuilder::region_material`](crate::DeformableBodyBuilder::region_material).
+    ///
+    /// # Errors
+    /// [`MeshError::RegionCount`] for more or fewer numbers than tetrahedra.
+    pub fn with_regions(self, regions: Vec<u32>) -> Result<Self, MeshError> {
+        match regions.len() == self.tetrahedra.len() {
+            true => Ok(Self { regions, ..self }),
+            false => Err(MeshError::RegionCount { regions: regions.len(), elements: self.tetrahedra.len() }),
+        }
+    }
+
+    /// The same with the region of each tetrahedron by the place \[m\] of its middle.
+    ///
+    /// ```
+    /// use foible3d::TetMesh;
+    /// // A sole of 1 cm under 3 cm of foam.
+    /// let shoe = TetMesh::cuboid([0.15, 0.02, 0.05], [15, 4, 5])?.painted(|[_, y, _]| u32::from(y < -0.01));
+    /// assert_eq!(shoe.regions().iter().filter(|region| **region == 1).count(), shoe.tetrahedra().len() / 4);
+    /// # Ok::<(), foible3d::MeshError>(())
+    /// ```
+    #[must_use]
+    pub fn painted(mut self, region: impl Fn([f64; 3]) -> u32) -> Self {
+        let middle = |tet: &[u32; 4]| middle(&self.vertices, tet);
+        self.regions = self.tetrahedra.iter().map(|tet| region(middle(tet))).collect();
+        self
+    }
+
+    pub(super) fn with_names(self, names: Vec<(u32, String)>) -> Self {
+        Self { names, ..self }
+    }
+
+    /// The region that a file gave this name.
+    pub fn region_named(&self, name: &str) -> Option<u32> {
+        self.names.iter().find(|(_, own)| own == name).map(|(region, _)| *region)
+    }
+
+    /// Region of each tetrahedron; 0 unless told or read.
+    pub fn regions(&self) -> &[u32] {
+        &self.regions
     }
 
     /// Rest positions \[m\], one per vertex.
@@ -78,6 +125,12 @@ impl TetMesh {
             )
         })
     }
+}
+
+/// The mean of an element's vertices.
+pub(super) fn middle(vertices: &[[f64; 3]], corners: &[u32]) -> [f64; 3] {
+    let sum = corners.iter().map(|v| Vec3::from(vertices[*v as usize])).sum::<Vec3>();
+    (sum / corners.len() as f64).into()
 }
 
 pub(super) fn check_finite(vertices: &[[f64; 3]]) -> Result<(), MeshError> {

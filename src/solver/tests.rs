@@ -55,7 +55,7 @@ fn prepared_of(mut body: DeformableBody) -> (FactorCache, BodyProblem) {
 /// The dense matrix of a body.
 fn dense(body: &DeformableBody, system: SystemMatrix) -> DMatrix<f64> {
     let symbolic = pattern_of(&body.model, system).unwrap();
-    let values = assemble(&body.model, &body.material, &[], system, H, &symbolic);
+    let values = assemble(&body.model, &body.materials, &[], system, H, &symbolic);
     let n = symbolic.column_starts().len() - 1;
     let mut A = DMatrix::zeros(n, n);
     for j in 0..n {
@@ -195,11 +195,15 @@ fn operator_solves_what_the_assembled_matrix_is() {
     let material = DeformableMaterial::new(1e5, 0.4).mass_damping(0.5).stiffness_damping(0.01);
     let block = || DeformableBodyBuilder::cuboid(Vector::new(0.3, 0.2, 0.2), [3, 2, 2]);
     let cloth = DeformableBodyBuilder::cloth([0.2, 0.1], [4, 3], 0.01);
-    for builder in [block(), block().smoothed(), cloth] {
+    let regions = |[x, _, _]: [f64; 3]| u32::from(x > 0.05);
+    let stiffer = material.youngs_modulus(1e6).poisson_ratio(0.2).density(3e3).stiffness_damping(0.0);
+    let whole = [block(), block().smoothed(), cloth];
+    let split = whole.clone().map(|builder| builder.regions(regions).region_material(1, stiffer));
+    for builder in whole.into_iter().chain(split) {
         let body = builder.material(material).build().unwrap();
         for system in [SystemMatrix::Laplacian, SystemMatrix::RestStiffness] {
             let A = dense(&body, system);
-            let operator = StiffnessOperator::new(&body.model, &body.material, &[], system, H);
+            let operator = StiffnessOperator::new(&body.model, &body.materials, &[], system, H);
             let b = DVector::from_fn(A.nrows(), |i, _| ((i * 37 % 101) as f64 - 50.0) * 10.0);
             let mut x = b.clone();
             operator.solve(x.as_mut_slice(), &mut ConjugateScratch::default());

@@ -1,5 +1,6 @@
 //! Gmsh `.msh` files.
 
+mod groups;
 mod sections;
 mod source;
 
@@ -12,7 +13,8 @@ use std::path::Path;
 impl TetMesh {
     /// Reads the linear tetrahedra of a Gmsh `.msh` file, formats 2.0 to 2.2, 4.0 and 4.1, text or binary. Elements of other
     /// kinds are passed over, and so are nodes that no tetrahedron has; coordinates are taken as metres. Vertices are in
-    /// the order in which tetrahedra first name them. Negatively oriented tetrahedra are turned round, which Gmsh leaves to its
+    /// the order in which tetrahedra first name them. Physical groups are regions, by their numbers, and 0 for what is in none: see
+    /// [`TetMesh::region_named`]. Negatively oriented tetrahedra are turned round, which Gmsh leaves to its
     /// readers.
     ///
     /// # Errors
@@ -38,7 +40,8 @@ impl TetMesh {
         let bytes = std::fs::read(path).map_err(|e| fail(e.to_string()))?;
         let grid = sections::read(&bytes).map_err(fail)?;
         let (vertices, tetrahedra) = geometry(&grid).map_err(fail)?;
-        TetMesh::new(vertices, tetrahedra)
+        let regions = grid.tetrahedra.iter().map(|(_, _, region)| *region).collect();
+        TetMesh::new(vertices, tetrahedra)?.with_regions(regions).map(|mesh| mesh.with_names(grid.names))
     }
 }
 
@@ -55,7 +58,7 @@ fn geometry(grid: &Grid) -> Result<Geometry, String> {
     let mut vertices = Vec::new();
     let mut index_of_tag = HashMap::new();
     let mut tetrahedra = Vec::with_capacity(grid.tetrahedra.len());
-    for (element, nodes) in &grid.tetrahedra {
+    for (element, nodes, _) in &grid.tetrahedra {
         let mut tet = [0; 4];
         for (corner, tag) in tet.iter_mut().zip(nodes) {
             let position = grid.positions.get(tag);

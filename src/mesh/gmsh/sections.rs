@@ -1,6 +1,7 @@
 //! Nodes and tetrahedra of Gmsh files by their tags: formats 2.0 to 2.2, 4.0 and 4.1, as text and binary
 //! [Geuzaine Remacle 2009].
 
+use super::groups::{read_entities, read_names, region_of};
 use super::source::{Encoding, Source};
 use std::collections::{BTreeMap, HashMap};
 
@@ -15,7 +16,7 @@ const NODES_OF_TYPE: [usize; 31] = [
 ];
 
 #[derive(Clone, Copy, PartialEq)]
-enum Version {
+pub(super) enum Version {
     /// 2.0 to 2.2: no blocks; how many there are is text.
     Two,
     /// Coordinates follow each node's tag.
@@ -28,8 +29,12 @@ enum Version {
 #[derive(Default)]
 pub(super) struct Grid {
     pub positions: HashMap<i64, [f64; 3]>,
-    /// Tags of tetrahedra, and of their nodes.
-    pub tetrahedra: Vec<(i64, [i64; 4])>,
+    /// Tags of tetrahedra, of their nodes, and their physical groups, or 0.
+    pub tetrahedra: Vec<(i64, [i64; 4], u32)>,
+    /// Physical groups of volumes, and their names.
+    pub names: Vec<(u32, String)>,
+    /// The physical group of each entity of three dimensions that is in one.
+    pub regions_of_volumes: HashMap<i64, u32>,
     /// How many elements of other types there are.
     pub others: BTreeMap<i64, usize>,
 }
@@ -46,6 +51,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Grid, String> {
         match (&*section, version) {
             ("MeshFormat", _) => version = Some(read_format(&mut source)?),
             ("NOD" | "NOE" | "ELM", _) => return Err(source.fail("version 1 of the format is not read")),
+            ("PhysicalNames", _) => read_names(&mut source, &mut grid)?,
+            ("Entities", Some(version @ (Version::Four | Version::FourOne))) => {
+                read_entities(&mut source, &mut grid, version)?;
+            }
             ("Nodes", Some(Version::Two)) => read_nodes(&mut source, &mut grid, false)?,
             ("ParametricNodes", Some(Version::Two)) => read_nodes(&mut source, &mut grid, true)?,
             ("Nodes", Some(version)) => read_node_blocks(&mut source, &mut grid, version)?,
@@ -110,7 +119,7 @@ fn read_nodes(source: &mut Source<'_>, grid: &mut Grid, are_parametric: bool) ->
 
 fn read_node_blocks(source: &mut Source<'_>, grid: &mut Grid, version: Version) -> Result<(), String> {
     for _ in 0..read_block_count(source, version)? {
-        let dimension = read_entity(source, version)?;
+        let (dimension, _) = read_entity(source, version)?;
         let parameters = if source.int()? == 0 { 0 } else { dimension };
         let count = source.count()?;
         let mut tags = Vec::new();
@@ -157,14 +166,15 @@ fn read_elements(source: &mut Source<'_>, grid: &mut Grid) -> Result<(), String>
 
 fn read_element_blocks(source: &mut Source<'_>, grid: &mut Grid, version: Version) -> Result<(), String> {
     for _ in 0..read_block_count(source, version)? {
-        read_entity(source, version)?;
+        let (_, entity) = read_entity(source, version)?;
+        let region = grid.regions_of_volumes.get(&entity).copied().unwrap_or(0);
         let kind = source.int()?;
         for _ in 0..source.count()? {
             let mut tag = || if version == Version::FourOne { source.size() } else { source.int() };
             let own = tag()?;
             if kind == TETRAHEDRON {
                 let nodes = [tag()?, tag()?, tag()?, tag()?];
-                grid.tetrahedra.push((own, nodes));
+                grid.tetrahedra.push((own, nodes, region));
             } else {
                 let width = if version == Version::FourOne { Width::Size } else { Width::Int };
                 pass_over(source, grid, kind, width)?;
@@ -184,13 +194,18 @@ fn read_element(
     if kind != TETRAHEDRON && source.encoding == Encoding::Text {
         return pass_over(source, grid, kind, Width::Int);
     }
-    for _ in 0..tags {
-        source.int()?;
+    let mut region = 0;
+    for k in 0..tags {
+        let tag = source.int()?;
+        if k == 0 && kind == TETRAHEDRON {
+            region = region_of(source, tag)?;
+        }
     }
     if kind != TETRAHEDRON {
         return pass_over(source, grid, kind, Width::Int);
     }
-    grid.tetrahedra.push((own, [source.int()?, source.int()?, source.int()?, source.int()?]));
+    let nodes = [source.int()?, source.int()?, source.int()?, source.int()?];
+    grid.tetrahedra.push((own, nodes, region));
     Ok(())
 }
 
@@ -230,13 +245,13 @@ fn read_block_count(source: &mut Source<'_>, version: Version) -> Result<i64, St
     Ok(blocks)
 }
 
-/// The dimension of the entity that a block belongs to.
-fn read_entity(source: &mut Source<'_>, version: Version) -> Result<i64, String> {
+/// Dimension and tag of the entity that a block belongs to.
+fn read_entity(source: &mut Source<'_>, version: Version) -> Result<(i64, i64), String> {
     let [first, second] = [source.int()?, source.int()?];
-    Ok(if version == Version::FourOne { first } else { second })
+    Ok(if version == Version::FourOne { (first, second) } else { (second, first) })
 }
 
-fn count_in_text(source: &mut Source<'_>) -> Result<i64, String> {
+pub(super) fn count_in_text(source: &mut Source<'_>) -> Result<i64, String> {
     let count = source.number_in_text::<u32>()?;
     source.skip_line();
     Ok(count.into())

@@ -64,6 +64,13 @@ impl<'a> Source<'a> {
         self.at += rest.iter().position(|b| *b == b'\n').map_or(rest.len(), |end| end + 1);
     }
 
+    /// What is left of the line.
+    pub fn rest_of_line(&mut self) -> Cow<'a, str> {
+        let start = self.at;
+        self.skip_line();
+        String::from_utf8_lossy(&self.bytes[start..self.at])
+    }
+
     /// The next word of text.
     pub fn word(&mut self) -> Result<Cow<'a, str>, String> {
         match self.next_word() {

@@ -3,7 +3,7 @@
 use super::work::BodyWork;
 use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Partner};
 use crate::contact::{BoxTree, Constraint, Endpoint, SoftDetector, SoftPair};
-use crate::coupling::{HookedPair, StepContext, combined_between};
+use crate::coupling::{HookedPair, StepContext, combine_in_place_between, combined_between};
 use crate::threads::for_each;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use std::collections::HashMap;
@@ -74,6 +74,8 @@ impl SoftPairDetection {
             let memory = &deformables[work(pair.ends[0]).handle].state.contacts;
             pair.constraints.clear();
             pair.detector.detect(&pair.pair, [&a, &b], memory, &mut pair.constraints);
+            let bodies = pair.ends.map(|end| (end, &deformables[work(end).handle]));
+            combine_in_place_between(bodies, &mut pair.constraints);
             // Between pinned nodes there is nothing to solve for.
             let is_pinned = |endpoint: &Endpoint| match endpoint {
                 Endpoint::Soft { body, .. } => work(*body).is_fully_pinned(endpoint),

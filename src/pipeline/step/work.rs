@@ -9,7 +9,7 @@ use crate::body::{
 use crate::contact::{
     Candidates, Constraint, Detector, Endpoint, Pair, ProxyId, STATIC_MARGIN, SoftSurface, SurfaceTree,
 };
-use crate::coupling::{HookedPair, RapierScene, StepContext, combined, packed};
+use crate::coupling::{HookedPair, RapierScene, StepContext, combine_in_place, combined, packed};
 use crate::math::Vec3;
 use crate::solver::{BodyProblem, FactorId, Island};
 use parry3d::bounding_volume::Aabb;
@@ -186,7 +186,9 @@ impl BodyWork {
             let pair = Pair { body: self.index, friction, restitution };
             self.pairs += 1;
             let memory = body.state.contacts_with(obstacle.key, obstacle.part);
+            let first = self.constraints.len();
             self.detector.detect(&pair, obstacle, model, x, memory, &mut self.constraints);
+            combine_in_place(body, collider, &mut self.constraints[first..]);
         }
         let mut constraints = std::mem::take(&mut self.constraints);
         constraints.retain_mut(|constraint| {

@@ -3,7 +3,7 @@
 use super::generalized_alpha::{SCALE, alpha_step};
 use super::problem::{BodyProblem, Iterate, SECOND_ORDER, Scheme};
 use crate::body::{DeformableBody, Integrator, PrescribedNode};
-use crate::fem::elastic_forces::StiffnessDamping;
+use crate::fem::StiffnessDamping;
 use crate::math::{Mat3, Vec3};
 use crate::solver::counters::SolveCounters;
 use crate::solver::linear::{FactorId, FactorKey, Preconditioner};
@@ -18,7 +18,8 @@ impl BodyProblem {
             has_columns: false,
             model: body.model.clone(),
             settings: *body.settings(),
-            material: body.material,
+            materials: body.materials.clone(),
+            mass_damping: 0.0,
             activation: body.activation,
             h,
             dt: h,
@@ -98,7 +99,8 @@ impl BodyProblem {
         (self.reach, self.scale) = if self.is_alpha() { (self.dt, SCALE) } else { (self.h, 1.0) };
         self.key.update(body, near, self.prescribed.iter().map(|p| p.node));
         self.settings = *body.settings();
-        self.material = body.material;
+        self.materials.clone_from(&body.materials);
+        self.mass_damping = body.model.mass_damping(&body.materials);
         self.activation = body.activation;
         self.step_damping = self.scale;
         self.guard_retries = 0;
@@ -113,8 +115,8 @@ impl BodyProblem {
         self.contact_force.resize(n, Vec3::zeros());
         self.step.resize(n, Vec3::zeros());
         let before = (self.scheme == Scheme::Bdf2).then_some(&body.state.history.x[..]);
-        let (beta, h) = (self.material.stiffness_damping, self.damping_step());
-        self.damping.begin(&self.model, beta, h, &body.state.x, before);
+        let elements = body.elements();
+        self.damping.begin(&elements, self.damping_step(), &body.state.x, before);
         let mass = self.masses.iter().sum::<f64>();
         self.weight = mass * (gravity * body.gravity_scale()).norm() / n as f64;
     }
@@ -133,8 +135,7 @@ impl BodyProblem {
                 *now += (*now - before) / 3.0;
             });
         }
-        self.masses.clear();
-        self.masses.extend((0..self.x_start.len()).map(|i| body.node_mass(i)));
+        self.masses.clone_from(&body.masses);
     }
 
     /// Sets where the nodes would go without internal and contact forces; pinned ones go where they are led.

@@ -3,6 +3,7 @@
 //! again by implicit Euler, or rejected.
 
 use super::problem::{BodyProblem, Scheme};
+use crate::fem::Elements;
 use crate::math::{RigidMotion, Vec3, centre_of_mass, rotation_from_vector};
 
 /// Residual over forces that gains next to nothing: the default tolerance. Checked at any, ten iterations of L-BFGS took
@@ -149,7 +150,9 @@ impl BodyProblem {
         }
         self.scheme = Scheme::ImplicitEuler;
         (self.h, self.reach, self.scale) = (self.dt, self.dt, 1.0);
-        self.damping.begin(&self.model, self.material.stiffness_damping, self.h, &self.x_start, None);
+        let (model, materials, activation) = (&*self.model, &self.materials, self.activation);
+        let elements = Elements { model, materials, activation };
+        self.damping.begin(&elements, self.h, &self.x_start, None);
         (self.step_damping, self.kinetic_bound) = (1.0, f64::INFINITY);
         true
     }

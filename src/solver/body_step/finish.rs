@@ -77,7 +77,7 @@ impl BodyProblem {
             gained += arm.cross(&self.fall[i]) * (*m * self.dt);
             lost += arm.cross(&v[i]) * *m;
         }
-        let drag = 1.0 + self.material.mass_damping * self.dt;
+        let drag = 1.0 + self.mass_damping * self.dt;
         let missing = (self.spin + gained) / drag - lost;
         let inertia = inertia_about(&centre, &self.current.x, &self.masses);
         let turn = solve_semidefinite(&inertia, &missing);
@@ -104,7 +104,7 @@ impl BodyProblem {
             let moved = (self.x_start[i] - start.centre) - (self.current.x[i] - centre);
             missing += moved.cross(&self.v_start[i]) * *m;
         }
-        let drag = 1.0 + self.material.mass_damping * self.dt;
+        let drag = 1.0 + self.mass_damping * self.dt;
         let inertia = inertia_about(&centre, &self.current.x, &self.masses);
         let turn = solve_semidefinite(&inertia, &missing) / drag;
         let share = self.share_without_gain(v, &turn, &(inertia * turn), &centre);

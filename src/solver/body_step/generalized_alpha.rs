@@ -18,7 +18,8 @@
 
 use super::problem::{BodyProblem, ROUNDING, Scheme};
 use crate::body::{DeformableBody, History};
-use crate::fem::elastic_forces::{self, Evaluation, StiffnessDamping};
+use crate::fem::StiffnessDamping;
+use crate::fem::elastic_forces::{self, Evaluation};
 use crate::math::{Mat3, Vec3, centre_of_mass, inertia_about, solve_semidefinite};
 
 /// What a step leaves of the stiffest motion, ρ∞ [Chung & Hulbert 1993].
@@ -180,7 +181,7 @@ impl BodyProblem {
     pub(super) fn balance_momenta(&self, v: &mut [Vec3]) {
         let (mass, centre_before) = centre_of_mass(&self.x_start, &self.masses);
         let (_, centre) = centre_of_mass(&self.current.x, &self.masses);
-        let drag = self.material.mass_damping;
+        let drag = self.mass_damping;
         let mut linear = (centre - centre_before) * (-mass * drag);
         let (mut angular, mut held) = (self.spin, Vec3::zeros());
         for (i, m) in self.masses.iter().enumerate() {

@@ -6,8 +6,8 @@
 
 use super::generalized_alpha::{ALPHA_F, AlphaStart};
 use crate::body::{Impact, PrescribedNode, SolverSettings};
-use crate::fem::elastic_forces::{Evaluation, StiffnessDamping};
-use crate::fem::{DeformableModel, Elements, elastic_forces};
+use crate::fem::elastic_forces::Evaluation;
+use crate::fem::{DeformableModel, Elements, StiffnessDamping, elastic_forces};
 use crate::material::DeformableMaterial;
 use crate::math::{
     Mat3, Vec3, centre_of_mass, inertia_about, rotation_from_vector, skew, solve_without_small,
@@ -50,7 +50,9 @@ pub(crate) struct BodyProblem {
     pub has_columns: bool,
     pub model: Arc<DeformableModel>,
     pub settings: SolverSettings,
-    pub(super) material: DeformableMaterial,
+    pub(super) materials: Vec<DeformableMaterial>,
+    /// α [1/s].
+    pub(super) mass_damping: f64,
     pub(super) activation: f64,
     /// The step that the objective is of \[s\], and that by which time goes on.
     pub(super) h: f64,
@@ -123,7 +125,7 @@ pub(crate) struct Iterate {
 impl BodyProblem {
     /// What is elastic in the body.
     pub fn elements(&self) -> Elements<'_> {
-        Elements { model: &self.model, material: &self.material, activation: self.activation }
+        Elements { model: &self.model, materials: &self.materials, activation: self.activation }
     }
 
     pub fn masses(&self) -> &[f64] {
@@ -142,7 +144,7 @@ impl BodyProblem {
 
     /// As [`BodyProblem::mobility`], in a step of `h` \[s\].
     pub(super) fn mobility_of(&self, h: f64) -> f64 {
-        h * h / (1.0 + self.material.mass_damping * h)
+        h * h / (1.0 + self.mass_damping * h)
     }
 
     /// The step \[s\] that the objective is of.
@@ -264,8 +266,8 @@ impl BodyProblem {
     pub(super) fn evaluate(&mut self, at: &mut Iterate, limit: f64) {
         at.r.clear();
         at.r.resize(at.x.len(), Vec3::zeros());
-        let (model, material, activation) = (&*self.model, &self.material, self.activation);
-        let elements = Elements { model, material, activation };
+        let (model, materials, activation) = (&*self.model, &self.materials, self.activation);
+        let elements = Elements { model, materials, activation };
         let place =
             Evaluation { damping: &self.damping, x: &at.x, frame: &self.frame, limit: limit / self.scale };
         let time = &mut self.preconditioner.counters.element_time;
@@ -294,7 +296,7 @@ impl BodyProblem {
 
     /// Factors of the masses in Ψ [1/s²], before distances to the target and from the start.
     pub(super) fn inertia_and_drag(&self) -> (f64, f64) {
-        (self.scale / (self.h * self.h), self.scale * self.material.mass_damping / self.damping_step())
+        (self.scale / (self.h * self.h), self.scale * self.mass_damping / self.damping_step())
     }
 
     /// What Ψ \[J\] is at least at `x`: what is not elastic.

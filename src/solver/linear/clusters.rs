@@ -37,12 +37,12 @@ pub(crate) struct TurnedClusters {
 }
 
 impl Clusters {
-    /// Slices of about equal numbers of elements along the body, which are in that order; `weight` \[Pa\] is that of
-    /// the Laplacian.
+    /// Slices of about equal numbers of elements along the body, which are in that order; `weights` \[Pa\] are those of
+    /// the regions in the Laplacian.
     pub fn new(
         model: &DeformableModel,
         count: usize,
-        weight: f64,
+        weights: &[f64],
         pins: &[u32],
         symbolic: &Symbolic,
         factor: &Factor,
@@ -51,7 +51,7 @@ impl Clusters {
         let n = model.rest.len();
         // By where they are: domains are not in the order of the sweep.
         let mut places = Vec::new();
-        model.for_each_solid(|nodes, _, _| {
+        model.for_each_solid(|_, nodes, _, _| {
             places.push(nodes.iter().map(|&n| n as usize).sum::<usize>() / nodes.len());
         });
         let mut order: Vec<usize> = (0..places.len()).collect();
@@ -61,8 +61,9 @@ impl Clusters {
         order.iter().enumerate().for_each(|(k, &e)| cluster[e] = k * count / order.len());
         let (mut Y, mut T) = (vec![vec![Vec3::zeros(); n]; count], vec![0.0; count]);
         let mut clusters = cluster.into_iter();
-        model.for_each_solid(|nodes, gradients, volume| {
+        model.for_each_solid(|region, nodes, gradients, volume| {
             let Some(c) = clusters.next() else { return };
+            let weight = weights[region];
             T[c] += 2.0 * weight * volume;
             nodes.iter().zip(gradients).for_each(|(&n, g)| Y[c][n as usize] += g * (weight * volume));
         });

@@ -1,6 +1,6 @@
 //! What the matrix of a step is put together with.
 
-use crate::fem::SystemMatrix;
+use crate::fem::{DeformableModel, SystemMatrix};
 use crate::material::DeformableMaterial;
 
 /// Unknowns per node.
@@ -16,7 +16,8 @@ pub(crate) fn stiffening(material: &DeformableMaterial, h: f64) -> f64 {
     1.0 + material.stiffness_damping / h
 }
 
-/// Inertia per volume in the matrix, (1 + αh) ρ/h² [N/m per m³].
-pub(crate) fn inertia(material: &DeformableMaterial, h: f64) -> f64 {
-    material.density * (1.0 + material.mass_damping * h) / (h * h)
+/// Inertia of the nodes in the matrix, (1 + αh) m/h² [N/m].
+pub(crate) fn node_inertia(model: &DeformableModel, materials: &[DeformableMaterial], h: f64) -> Vec<f64> {
+    let alpha = model.mass_damping(materials);
+    model.weigh_nodes(materials, |material| material.density * (1.0 + alpha * h) / (h * h))
 }

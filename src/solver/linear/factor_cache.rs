@@ -16,6 +16,7 @@ use super::system::FactorKey;
 use crate::body::{DeformableBody, Solver};
 use crate::fem::constant_matrix::laplacian_weight;
 use crate::fem::{DeformableModel, SystemMatrix};
+use crate::material::DeformableMaterial;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -237,9 +238,10 @@ impl FactorCache {
         };
         let columns = ComplianceColumns::new(&body.model.surface, key.system);
         let clusters = (key.clusters > 0).then(|| {
-            let weight = laplacian_weight(&body.material) * stiffening(&body.material, key.h());
+            let weight = |m: &DeformableMaterial| laplacian_weight(m) * stiffening(m, key.h());
+            let weights: Vec<f64> = body.materials.iter().map(weight).collect();
             let (pins, scratch) = (&key.pins, &mut self.scratch);
-            Clusters::new(&body.model, key.clusters, weight, pins, &symbolic, &factor, scratch)
+            Clusters::new(&body.model, key.clusters, &weights, pins, &symbolic, &factor, scratch)
         });
         let serial = self.made;
         let factor = Arc::new(factor);
@@ -280,8 +282,9 @@ impl FactorCache {
         symbolic: &Symbolic,
         base: Arc<Factor>,
     ) -> Option<(Factor, CoarseInverse)> {
-        let assemble =
-            |pins: &[u32]| system::assemble(&body.model, &body.material, pins, key.system, key.h(), symbolic);
+        let assemble = |pins: &[u32]| {
+            system::assemble(&body.model, &body.materials, pins, key.system, key.h(), symbolic)
+        };
         let coarse = CoarseInverse::new(&body.model, &key.pins, symbolic, &assemble(&key.pins));
         let both: Vec<u32> = key.base.iter().copied().filter(|n| key.pins.binary_search(n).is_ok()).collect();
         let pins = [&key.base[..], &key.pins[..]];
@@ -298,11 +301,11 @@ impl FactorCache {
     ) -> Option<(Factor, CoarseInverse)> {
         let h = key.h();
         if key.solver == Solver::ConjugateGradients {
-            let operator = StiffnessOperator::new(&body.model, &body.material, &key.pins, key.system, h);
+            let operator = StiffnessOperator::new(&body.model, &body.materials, &key.pins, key.system, h);
             let coarse = CoarseInverse { local: operator.local_compliance(), modes: None };
             return Some((Factor::Iterative(Box::new(operator)), coarse));
         }
-        let values = system::assemble(&body.model, &body.material, &key.pins, key.system, h, symbolic);
+        let values = system::assemble(&body.model, &body.materials, &key.pins, key.system, h, symbolic);
         let coarse = match key.solver {
             Solver::Projective | Solver::ConjugateGradients => {
                 CoarseInverse::new(&body.model, &key.pins, symbolic, &values)

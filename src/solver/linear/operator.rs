@@ -1,7 +1,7 @@
 //! The constant matrix as what it does, element by element, without being put together: for conjugate gradients
 //! on bodies whose factor would not fit, or would be made anew all the time.
 
-use super::coefficients::{dimension, inertia, stiffening};
+use super::coefficients::{dimension, node_inertia, stiffening};
 use super::gauss_seidel::OVER_DIAGONAL;
 use crate::fem::constant_matrix::{add_blocks, subtract_product};
 use crate::fem::{DeformableModel, Elements, SystemMatrix};
@@ -13,10 +13,10 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(crate) struct StiffnessOperator {
     model: Arc<DeformableModel>,
-    material: DeformableMaterial,
+    materials: Vec<DeformableMaterial>,
     system: SystemMatrix,
-    /// 1 + β/h.
-    stiffening: f64,
+    /// \[s\].
+    h: f64,
     /// (1 + αh) m/h² per node [N/m]; one for pinned nodes.
     inertia: Vec<f64>,
     pins: Vec<u32>,
@@ -43,31 +43,35 @@ const MAX_STEPS: usize = 1000;
 impl StiffnessOperator {
     pub fn new(
         model: &Arc<DeformableModel>,
-        material: &DeformableMaterial,
+        materials: &[DeformableMaterial],
         pins: &[u32],
         system: SystemMatrix,
         h: f64,
     ) -> Self {
-        let inertia = inertia(material, h);
         let mut operator = Self {
             model: model.clone(),
-            material: *material,
+            materials: materials.to_vec(),
             system,
-            stiffening: stiffening(material, h),
-            inertia: model.node_volumes.iter().map(|v| inertia * v).collect(),
+            h,
+            inertia: node_inertia(model, materials, h),
             pins: pins.to_vec(),
             inverse_diagonal: Vec::new(),
         };
         pins.iter().for_each(|&p| operator.inertia[p as usize] = 1.0);
         let mut diagonal = vec![Mat3::zeros(); model.rest.len()];
-        add_blocks(&operator.elements(), system, |i, j, block| {
-            if i == j {
-                diagonal[i] += block;
-            }
-        });
+        add_blocks(
+            &operator.elements(),
+            system,
+            |material| stiffening(material, h),
+            |i, j, block| {
+                if i == j {
+                    diagonal[i] += block;
+                }
+            },
+        );
         pins.iter().for_each(|&p| diagonal[p as usize] = Mat3::zeros());
         let invert = |(d, m): (&Mat3, &f64)| {
-            let block = d * operator.stiffening + Mat3::from_diagonal_element(*m);
+            let block = d + Mat3::from_diagonal_element(*m);
             block.try_inverse().unwrap_or_else(|| Mat3::from_diagonal_element(1.0 / m))
         };
         operator.inverse_diagonal = diagonal.iter().zip(&operator.inertia).map(invert).collect();
@@ -87,17 +91,18 @@ impl StiffnessOperator {
     }
 
     fn elements(&self) -> Elements<'_> {
-        Elements { model: &self.model, material: &self.material, activation: 1.0 }
+        Elements { model: &self.model, materials: &self.materials, activation: 1.0 }
     }
 
     /// `out = A v`; v is zero at pinned nodes.
     fn multiply(&self, v: &[Vec3], out: &mut Vec<Vec3>) {
         out.clear();
         out.resize(v.len(), Vec3::zeros());
-        subtract_product(&self.elements(), self.system, v, out);
+        let stiffening = |material: &DeformableMaterial| stiffening(material, self.h);
+        subtract_product(&self.elements(), self.system, stiffening, v, out);
         self.pins.iter().for_each(|&p| out[p as usize] = Vec3::zeros());
         for ((out, v), m) in out.iter_mut().zip(v).zip(&self.inertia) {
-            *out = v * *m - *out * self.stiffening;
+            *out = v * *m - *out;
         }
     }
 

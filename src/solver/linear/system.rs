@@ -6,9 +6,10 @@
 //! A pinned node has the identity for its row and column, so every set of pins shares one symbolic
 //! factor.
 
-use super::coefficients::{dimension, inertia, stiffening};
+use super::coefficients::{dimension, node_inertia, stiffening};
 use super::factor::Symbolic;
 use crate::body::{DeformableBody, FactorPrecision, Solver};
+use crate::energy::Elasticity;
 use crate::fem::constant_matrix::add_blocks;
 use crate::fem::{DeformableModel, Elements, SystemMatrix, add_tangents};
 use crate::material::DeformableMaterial;
@@ -22,12 +23,29 @@ pub(crate) struct FactorKey {
     pub system: SystemMatrix,
     precision: FactorPrecision,
     pub clusters: usize,
-    elasticity: crate::energy::Elasticity,
-    /// Bits of h, E, ν, ρ, α, β, and the modulus of fibres.
-    bits: [u64; 7],
+    /// Bits of h.
+    step: u64,
+    /// Of each region.
+    materials: Vec<MaterialKey>,
     /// Pinned nodes, ascending; and those of the factor that this one is made from, the same if it is not made from another.
     pub pins: Vec<u32>,
     pub base: Vec<u32>,
+}
+
+/// What of a material a matrix depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct MaterialKey {
+    elasticity: Elasticity,
+    /// Bits of E, ν, ρ, α, β, and the modulus of fibres.
+    bits: [u64; 6],
+}
+
+impl MaterialKey {
+    fn new(m: &DeformableMaterial) -> Self {
+        let [e, nu, rho] = [m.youngs_modulus, m.poisson_ratio, m.density];
+        let bits = [e, nu, rho, m.mass_damping, m.stiffness_damping, m.fibre_modulus].map(f64::to_bits);
+        Self { elasticity: m.elasticity, bits }
+    }
 }
 
 impl FactorKey {
@@ -38,8 +56,8 @@ impl FactorKey {
             system: SystemMatrix::default(),
             precision: FactorPrecision::default(),
             clusters: 0,
-            elasticity: body.material.elasticity,
-            bits: [0; 7],
+            step: 0,
+            materials: Vec::new(),
             pins: Vec::new(),
             base: Vec::new(),
         };
@@ -49,14 +67,14 @@ impl FactorKey {
 
     /// The step \[s\] that the matrix is of.
     pub fn h(&self) -> f64 {
-        f64::from_bits(self.bits[0])
+        f64::from_bits(self.step)
     }
 
     /// Whether a factor of the other key differs by its step alone.
     pub fn is_of_another_step(&self, other: &Self) -> bool {
-        let same = |k: &Self| (k.model, k.solver, k.system, k.precision, k.clusters, k.elasticity);
+        let same = |k: &Self| (k.model, k.solver, k.system, k.precision, k.clusters);
         same(self) == same(other)
-            && self.bits[1..] == other.bits[1..]
+            && self.materials == other.materials
             && self.pins == other.pins
             && self.base == other.base
     }
@@ -68,8 +86,6 @@ impl FactorKey {
 
     /// The key of a body at a step of `h` \[s\] with further nodes pinned, in the memory of another.
     pub fn update(&mut self, body: &DeformableBody, h: f64, further: impl Iterator<Item = u32>) {
-        let m = &body.material;
-        let [e, nu, rho] = [m.youngs_modulus, m.poisson_ratio, m.density];
         self.model = body.model.id;
         self.solver = body.settings().solver;
         self.system = match self.solver {
@@ -81,8 +97,9 @@ impl FactorKey {
             SystemMatrix::Laplacian if body.model.is_solid() => body.settings().clusters,
             _ => 0,
         };
-        self.elasticity = m.elasticity;
-        self.bits = [h, e, nu, rho, m.mass_damping, m.stiffness_damping, m.fibre_modulus].map(f64::to_bits);
+        self.step = h.to_bits();
+        self.materials.clear();
+        self.materials.extend(body.materials.iter().map(MaterialKey::new));
         self.pins.clear();
         self.pins.extend(body.pins.iter().map(|p| p.node).chain(further));
         self.pins.sort_unstable();
@@ -108,16 +125,16 @@ pub(crate) fn pattern_of(model: &DeformableModel, system: SystemMatrix) -> Optio
 /// The values of a body's constant matrix, in the order of [`Symbolic::rows`].
 pub(crate) fn assemble(
     model: &DeformableModel,
-    material: &DeformableMaterial,
+    materials: &[DeformableMaterial],
     pins: &[u32],
     system: SystemMatrix,
     h: f64,
     symbolic: &Symbolic,
 ) -> Vec<f64> {
-    let mut matrix = Upper::new(model, material, pins, system, h, symbolic);
-    let stiffening = stiffening(material, h);
-    let elements = Elements { model, material, activation: 1.0 };
-    add_blocks(&elements, system, |i, j, block| matrix.add_elastic(i, j, &(block * stiffening)));
+    let mut matrix = Upper::new(model, materials, pins, system, h, symbolic);
+    let elements = Elements { model, materials, activation: 1.0 };
+    let stiffening = |material: &DeformableMaterial| stiffening(material, h);
+    add_blocks(&elements, system, stiffening, |i, j, block| matrix.add_elastic(i, j, block));
     matrix.values
 }
 
@@ -131,10 +148,10 @@ pub(crate) fn assemble_tangent(
     h: f64,
     symbolic: &Symbolic,
 ) -> Vec<f64> {
-    let Elements { model, material, .. } = elements;
-    let mut matrix = Upper::new(model, material, pins, SystemMatrix::RestStiffness, h, symbolic);
-    let stiffening = stiffening(material, h);
-    add_tangents(elements, x, projected, |i, j, block| matrix.add_elastic(i, j, &(block * stiffening)));
+    let Elements { model, materials, .. } = elements;
+    let mut matrix = Upper::new(model, materials, pins, SystemMatrix::RestStiffness, h, symbolic);
+    let stiffening = |material: &DeformableMaterial| stiffening(material, h);
+    add_tangents(elements, x, projected, stiffening, |i, j, block| matrix.add_elastic(i, j, block));
     matrix.values
 }
 
@@ -192,7 +209,7 @@ impl<'a> Upper<'a> {
     /// With the inertia in it, and the identity for pinned nodes.
     fn new(
         model: &DeformableModel,
-        material: &DeformableMaterial,
+        materials: &[DeformableMaterial],
         pins: &[u32],
         system: SystemMatrix,
         h: f64,
@@ -202,9 +219,8 @@ impl<'a> Upper<'a> {
         pins.iter().for_each(|&p| pinned[p as usize] = true);
         let values = vec![0.0; symbolic.rows().len()];
         let mut matrix = Self { symbolic, values, pinned, d: dimension(system) };
-        let inertia = inertia(material, h);
-        for (j, &volume) in model.node_volumes.iter().enumerate() {
-            let diagonal = if matrix.pinned[j] { 1.0 } else { inertia * volume };
+        for (j, inertia) in node_inertia(model, materials, h).into_iter().enumerate() {
+            let diagonal = if matrix.pinned[j] { 1.0 } else { inertia };
             matrix.add(j, j, &Mat3::from_diagonal_element(diagonal));
         }
         matrix

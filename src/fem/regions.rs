@@ -1,0 +1,184 @@
+//! Regions: the elements of a body that share a material, side by side, so that every loop over elements is one over
+//! regions and, in each, over elements of one material.
+
+use super::elements::ElementBlock;
+use super::model::DeformableModel;
+use crate::material::DeformableMaterial;
+use crate::math::Vec3;
+use crate::math::lanes::LANES;
+use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
+
+/// Where the elements of a region are in the model.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Region {
+    /// Its user's number.
+    pub tag: u32,
+    pub tetrahedra: Range<usize>,
+    /// Blocks of four of them.
+    pub blocks: Range<usize>,
+    /// Blocks of smoothing domains: around edges, and patches.
+    pub domains: Range<usize>,
+    pub patches: Range<usize>,
+    pub triangles: Range<usize>,
+    /// Volume at rest \[m³\].
+    pub volume: f64,
+    /// What it has of the volumes of its nodes \[m³\], by node.
+    shares: Vec<(u32, f64)>,
+}
+
+/// The volumes of nodes while a model is being made.
+pub(super) struct VolumeShares {
+    /// Distinct and ascending.
+    tags: Vec<u32>,
+    by_region: Vec<BTreeMap<u32, f64>>,
+    volumes: Vec<f64>,
+    /// Of all regions \[m³\].
+    pub nodes: Vec<f64>,
+}
+
+impl VolumeShares {
+    pub fn new(regions: impl Iterator<Item = u32>, nodes: usize) -> Self {
+        let mut tags: Vec<u32> = regions.collect();
+        tags.sort_unstable();
+        tags.dedup();
+        Self {
+            by_region: vec![BTreeMap::new(); tags.len()],
+            volumes: vec![0.0; tags.len()],
+            tags,
+            nodes: vec![0.0; nodes],
+        }
+    }
+
+    /// The place of a region among all.
+    pub fn place(&self, tag: u32) -> u32 {
+        self.tags.partition_point(|t| *t < tag) as u32
+    }
+
+    /// Shares a volume \[m³\] among the nodes of an element.
+    pub fn add(&mut self, region: u32, nodes: &[u32], volume: f64) {
+        self.volumes[region as usize] += volume;
+        let share = volume / nodes.len() as f64;
+        for &n in nodes {
+            self.nodes[n as usize] += share;
+            if self.tags.len() > 1 {
+                *self.by_region[region as usize].entry(n).or_default() += share;
+            }
+        }
+    }
+
+    /// One region at least. The first of one alone are all.
+    pub fn finish(self) -> (Vec<Region>, Vec<f64>) {
+        let all = self.tags.into_iter().zip(self.volumes).zip(self.by_region);
+        let region = |((tag, volume), shares): ((u32, f64), BTreeMap<u32, f64>)| Region {
+            tag,
+            volume,
+            shares: shares.into_iter().collect(),
+            ..Region::default()
+        };
+        (all.map(region).collect(), self.nodes)
+    }
+}
+
+/// Sets a range of every region: where it is in a list that is sorted by regions.
+pub(super) fn set_ranges(
+    regions: &mut [Region],
+    sorted: impl Iterator<Item = u32>,
+    range: impl Fn(&mut Region) -> &mut Range<usize>,
+) {
+    let mut counts = vec![0; regions.len()];
+    sorted.for_each(|region| counts[region as usize] += 1);
+    let mut start = 0;
+    for (region, count) in regions.iter_mut().zip(counts) {
+        *range(region) = start..start + count;
+        start += count;
+    }
+}
+
+/// Blocks of four tetrahedra of a region each.
+pub(super) fn blocks(regions: &mut [Region], tetrahedra: &[[u32; 4]], rest: &[Vec3]) -> Vec<ElementBlock> {
+    let mut blocks = Vec::new();
+    for region in regions {
+        let own = tetrahedra.get(region.tetrahedra.clone()).unwrap_or_default();
+        let first = blocks.len();
+        blocks.extend(own.chunks(LANES).map(|four| ElementBlock::new(four, rest)));
+        region.blocks = first..blocks.len();
+    }
+    blocks
+}
+
+impl DeformableModel {
+    /// The same with every element in the region that `region` says of its place in the rest shape \[m\], as
+    /// [`Structure::painted`](crate::Structure::painted).
+    #[must_use]
+    pub fn painted(&self, region: impl Fn([f64; 3]) -> u32) -> Self {
+        let mut painted = Self::of((*self.structure).clone().painted(region));
+        // Nodes keep their order, tetrahedra do not.
+        let places: HashMap<[u32; 4], u32> = painted.tetrahedra.iter().copied().zip(0..).collect();
+        let place = |(tet, along): &(u32, Vec3)| (places[&self.tetrahedra[*tet as usize]], *along);
+        painted.add_fibres(&self.fibres.iter().map(place).collect::<Vec<_>>());
+        if self.is_smoothed() { painted.smoothed() } else { painted }
+    }
+
+    /// The regions that its elements are in, ascending.
+    pub fn regions(&self) -> impl ExactSizeIterator<Item = u32> + '_ {
+        self.regions.iter().map(|region| region.tag)
+    }
+
+    /// Vertices of the elements of a region, ascending: to pin, push or attach.
+    pub fn region_vertices(&self, region: u32) -> Vec<usize> {
+        let Some(place) = self.region(region) else { return Vec::new() };
+        let own = &self.regions[place];
+        let mut nodes: Vec<u32> = self.tetrahedra[own.tetrahedra.clone()].iter().flatten().copied().collect();
+        nodes.extend(self.triangles[own.triangles.clone()].iter().flat_map(|t| t.nodes));
+        let stencils = self.stencils.iter().filter(|s| s.regions == [place as u32; 2]);
+        nodes.extend(stencils.flat_map(|s| s.nodes));
+        let mut vertices: Vec<usize> = nodes.into_iter().map(|n| self.vertex(n as usize)).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        vertices
+    }
+
+    /// The place of a region among all, if an element is in it.
+    pub(crate) fn region(&self, tag: u32) -> Option<usize> {
+        self.regions.binary_search_by_key(&tag, |region| region.tag).ok()
+    }
+
+    /// The sum over the regions of what each has of the nodes' volumes times `weight` of its material.
+    pub(crate) fn weigh_nodes(
+        &self,
+        materials: &[DeformableMaterial],
+        weight: impl Fn(&DeformableMaterial) -> f64,
+    ) -> Vec<f64> {
+        if let [material] = materials {
+            let weight = weight(material);
+            return self.node_volumes.iter().map(|volume| weight * volume).collect();
+        }
+        let mut sums = vec![0.0; self.rest.len()];
+        for (region, material) in self.regions.iter().zip(materials) {
+            let weight = weight(material);
+            region.shares.iter().for_each(|(node, volume)| sums[*node as usize] += weight * volume);
+        }
+        sums
+    }
+
+    /// Mass-proportional damping α [1/s] of the whole: by mass the mean of the materials'.
+    pub(crate) fn mass_damping(&self, materials: &[DeformableMaterial]) -> f64 {
+        if let [material] = materials {
+            return material.mass_damping;
+        }
+        self.weigh(materials, |m| m.density * m.mass_damping) / self.weigh(materials, |m| m.density)
+    }
+
+    /// The sum over the regions of their volume times `weight` of their material.
+    pub(crate) fn weigh(
+        &self,
+        materials: &[DeformableMaterial],
+        weight: impl Fn(&DeformableMaterial) -> f64,
+    ) -> f64 {
+        if let [material] = materials {
+            return weight(material) * self.volume;
+        }
+        self.regions.iter().zip(materials).map(|(region, material)| weight(material) * region.volume).sum()
+    }
+}
