@@ -17,6 +17,9 @@ pub enum BodyError {
         /// Number of vertices of the body.
         vertices: usize,
     },
+    /// The body's stiffness has a negative mode where it is: it is not at a stable rest.
+    #[error("the body is not stable where it is: its stiffness has a negative mode")]
+    Unstable,
     /// No element of the body is in that region.
     #[error("region {region} does not exist: the body has {regions}")]
     NoSuchRegion {

@@ -22,6 +22,7 @@
 //! | `solver` | factors, a body's step, the cone problem, constraints of an island and its iteration |
 //! | `coupling` | rapier's sets, read into obstacles and proxies, and the reactions written back |
 //! | `pipeline` | the world, the pipeline and what can be read of a step; inside, the step as a list of verbs |
+//! | `export` | files of what has been simulated |
 //!
 //! # Invariants
 //! - A module imports from modules above it in the table only, within `solver` too (`tests/architecture.rs`).
@@ -85,6 +86,8 @@ mod coupling;
 
 mod pipeline;
 
+mod export;
+
 pub use body::{
     Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
     DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableContactPartner,
@@ -98,6 +101,8 @@ pub use coupling::{
 };
 pub use energy::Elasticity;
 pub use error::{BodyError, DeformableBodyError, HandleError};
+#[cfg(feature = "export")]
+pub use export::VtkSeries;
 pub use fem::{DeformableModel, SystemMatrix};
 pub use material::{DeformableMaterial, MaterialError};
 pub use mesh::{
@@ -106,11 +111,13 @@ pub use mesh::{
 pub use pipeline::{
     DeformableChannelEventCollector, DeformableCollisionEvent, DeformableContact,
     DeformableContactForceEvent, DeformableCounters, DeformableEventHandler, DeformablePairContact,
-    DeformableParameters, DeformablePipeline, DeformableWorld, JointForce, RigidContact, SolvedJoint,
+    DeformableParameters, DeformablePipeline, DeformableRest, DeformableWorld, JointForce, RigidContact,
+    SolvedJoint,
 };
 #[cfg(feature = "debug-render")]
 pub use pipeline::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};
 pub use skin::{DeformableSkin, DeformableSurfaceMesh};
+pub use solver::DeformableMode;
 
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
 pub mod prelude {
@@ -119,12 +126,12 @@ pub mod prelude {
         DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
         DeformableChannelEventCollector, DeformableColliders, DeformableCollisionEvent, DeformableContact,
         DeformableContactForceEvent, DeformableContactModificationContext, DeformableContactPartner,
-        DeformableCounters, DeformableEventHandler, DeformableHooks, DeformableMaterial, DeformableModel,
-        DeformablePairContact, DeformablePairFilterContext, DeformableParameters, DeformablePipeline,
-        DeformableSkin, DeformableSolverContact, DeformableStress, DeformableSurfaceMesh,
-        DeformableSurfacePoint, DeformableWind, DeformableWorld, Elasticity, FactorPrecision, Fidelity,
-        Frames, Integrator, JointForce, JointRole, PhysicsParts, RigidContact, SolvedJoint, Solver,
-        SolverSettings, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix, TetMesh,
+        DeformableCounters, DeformableEventHandler, DeformableHooks, DeformableMaterial, DeformableMode,
+        DeformableModel, DeformablePairContact, DeformablePairFilterContext, DeformableParameters,
+        DeformablePipeline, DeformableRest, DeformableSkin, DeformableSolverContact, DeformableStress,
+        DeformableSurfaceMesh, DeformableSurfacePoint, DeformableWind, DeformableWorld, Elasticity,
+        FactorPrecision, Fidelity, Frames, Integrator, JointForce, JointRole, PhysicsParts, RigidContact,
+        SolvedJoint, Solver, SolverSettings, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix, TetMesh,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

@@ -27,7 +27,7 @@ promises! {
         Acceleration, FactorPrecision, Fidelity, Elasticity, DeformableBodyHandle, DeformableAttachment,
         DeformableAttachmentHandle, AttachTo, DeformableContact, DeformablePairContact, RigidContact, JointForce,
         JointRole, SolvedJoint, DeformableSurfacePoint, DeformableBodyError, BodyError, HandleError, MaterialError,
-        MeshError, DeformableContactPartner, DeformableWind, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceFault, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableCollisionEvent,
+        MeshError, DeformableContactPartner, DeformableWind, DeformableRest, DeformableMode, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceFault, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableCollisionEvent,
         DeformableContactForceEvent, DeformableChannelEventCollector, DeformableSolverContact,
         DeformablePairFilterContext<'static>, DeformableContactModificationContext<'static>;
     is_printed: DeformableColliders, DeformableSkin, DeformableSurfaceMesh, DeformableChannelEventCollector, DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody,
@@ -43,7 +43,7 @@ promises! {
     is_copied: DeformableMaterial, DeformableParameters, DeformableCounters, SolverSettings, Solver, SystemMatrix,
         Frames, Integrator, Acceleration, FactorPrecision, Fidelity, Elasticity, DeformableBodyHandle,
         DeformableAttachmentHandle, DeformableContact, DeformablePairContact, RigidContact, JointForce, JointRole,
-        SolvedJoint, DeformableSurfacePoint, BodyError, HandleError, MaterialError, DeformableContactPartner, DeformableWind,
+        SolvedJoint, DeformableSurfacePoint, BodyError, HandleError, MaterialError, DeformableContactPartner, DeformableWind, DeformableRest,
         DeformableCollisionEvent, DeformableContactForceEvent, DeformableSolverContact;
 }
 
@@ -66,8 +66,12 @@ fn every_type_of_the_surface_is_promised_to_be_thread_safe() {
     let traits = ["DeformableHooks", "DeformableEventHandler"];
     #[cfg(feature = "debug-render")]
     is_thread_safe::<(DeformableDebugRenderPipeline, DeformableDebugRenderStyle)>();
+    #[cfg(feature = "export")]
+    (is_thread_safe::<foible3d::VtkSeries>(), is_printed::<foible3d::VtkSeries>());
     let missing: Vec<_> =
         exported.iter().filter(|name| !promised.contains(name) && !traits.contains(name)).collect();
-    let missing: Vec<_> = missing.iter().filter(|name| !name.starts_with("DeformableDebugRender")).collect();
+    // Of features, and promised above.
+    let is_of_a_feature = |name: &str| name.starts_with("DeformableDebugRender") || name == "VtkSeries";
+    let missing: Vec<_> = missing.iter().filter(|name| !is_of_a_feature(name)).collect();
     assert!(missing.is_empty(), "{missing:?}");
 }

@@ -21,7 +21,7 @@ const ROOMS: [&[&str]; 13] = [
     &["solver"],
     &["coupling"],
     &["pipeline"],
-    &[],
+    &["export"],
 ];
 
 /// Within `solver`, from the ground up.

@@ -62,7 +62,7 @@ impl DeformableBody {
     }
 
     /// Makes what follows from materials and model.
-    pub(super) fn distribute_materials(&mut self) {
+    pub(crate) fn distribute_materials(&mut self) {
         let model = self.model.clone();
         self.materials = model.regions().map(|region| *self.region_material(region)).collect();
         self.masses = model.weigh_nodes(&self.materials, |material| material.density);

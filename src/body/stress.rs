@@ -132,7 +132,7 @@ impl DeformableBody {
     }
 
     /// Energy \[J\], and forces on nodes \[N\], without damping.
-    pub(super) fn elastic_response(&self) -> (f64, Vec<Vec3>) {
+    pub(crate) fn elastic_response(&self) -> (f64, Vec<Vec3>) {
         use crate::fem::StiffnessDamping;
         use crate::fem::elastic_forces::{Evaluation, add_forces};
         let mut force = vec![Vec3::zeros(); self.state.x.len()];

@@ -227,6 +227,14 @@ impl DeformableModel {
         self.half_thickness.iter().copied().fold(0.0, f64::max)
     }
 
+    /// Volume at rest of a tetrahedron \[m³\].
+    ///
+    /// # Panics
+    /// If there is no such tetrahedron.
+    pub fn tetrahedron_volume(&self, tet: usize) -> f64 {
+        crate::mesh::signed_volume(&self.tetrahedra[tet].map(|n| self.rest[n as usize]))
+    }
+
     /// Rest position of a vertex \[m\].
     ///
     /// # Panics

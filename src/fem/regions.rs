@@ -6,6 +6,7 @@ use super::model::DeformableModel;
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
 use crate::math::lanes::LANES;
+use crate::mesh::Rod;
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
@@ -137,6 +138,29 @@ impl DeformableModel {
         vertices.sort_unstable();
         vertices.dedup();
         vertices
+    }
+
+    /// The region of a tetrahedron.
+    ///
+    /// # Panics
+    /// If there is no such tetrahedron.
+    pub fn region_of_tetrahedron(&self, tet: usize) -> u32 {
+        self.regions[self.regions.partition_point(|region| region.tetrahedra.end <= tet)].tag
+    }
+
+    /// Vertices of the triangles of sheets, and their regions.
+    pub fn sheet_triangles(&self) -> impl Iterator<Item = ([u32; 3], u32)> + '_ {
+        let vertex = |n: u32| self.vertex_of_node[n as usize];
+        self.triangles.iter().map(move |t| (t.nodes.map(vertex), self.regions[t.region as usize].tag))
+    }
+
+    /// Vertices of the segments of rods, and their regions.
+    pub fn rod_segments(&self) -> impl Iterator<Item = ([u32; 2], u32)> + '_ {
+        let segments = |rod: &'_ Rod| -> Vec<([u32; 2], u32)> {
+            let ends = rod.points.windows(2).map(|ends| [ends[0], ends[1]]);
+            ends.zip(rod.regions.iter().copied()).collect()
+        };
+        self.structure.rods.iter().flat_map(segments)
     }
 
     /// The place of a region among all, if an element is in it.

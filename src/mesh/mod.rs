@@ -3,7 +3,6 @@
 //! Architecture invariant: nothing here knows materials, time or rapier's sets.
 
 mod fill;
-mod gmsh;
 #[cfg(feature = "import")]
 mod import;
 mod lattice;
@@ -14,6 +13,7 @@ mod structure;
 mod structure_check;
 mod surface;
 mod tet_mesh;
+mod volumes;
 
 pub use mesh_error::MeshError;
 pub(crate) use ordering::{node_adjacency, sweep_order};

@@ -78,6 +78,15 @@ impl TetMesh {
         self
     }
 
+    /// The same with all lengths times `factor`: 0.001 for millimetres.
+    ///
+    /// # Errors
+    /// As [`TetMesh::new`], of a factor that makes it too small, too large or nothing.
+    pub fn scaled(self, factor: f64) -> Result<Self, MeshError> {
+        let vertices = self.vertices.iter().map(|v| v.map(|c| c * factor)).collect();
+        Ok(Self { regions: self.regions, names: self.names, ..Self::new(vertices, self.tetrahedra)? })
+    }
+
     pub(super) fn with_names(self, names: Vec<(u32, String)>) -> Self {
         Self { names, ..self }
     }

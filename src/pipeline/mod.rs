@@ -11,6 +11,7 @@ mod pipeline;
 
 #[cfg(feature = "debug-render")]
 mod debug_render;
+mod statics;
 mod world;
 
 pub use contacts::{DeformableContact, DeformablePairContact, JointForce, RigidContact, SolvedJoint};
@@ -22,4 +23,5 @@ pub use events::{
 };
 pub use parameters::{DeformableCounters, DeformableParameters};
 pub use pipeline::DeformablePipeline;
+pub use statics::DeformableRest;
 pub use world::DeformableWorld;

@@ -33,4 +33,5 @@ pub(crate) use constraints::{
     Articulation, ContactLimits, ContactResult, Reaction, RigidProxies, RigidProxy, SolveContext, Twist,
 };
 pub(crate) use island::{Island, IslandReport};
+pub use linear::DeformableMode;
 pub(crate) use linear::{FactorCache, FactorId, FactorKey, STEPS_KEPT};

@@ -28,6 +28,8 @@ mod rigid_mode;
 
 mod preconditioner;
 
+mod modes;
+
 pub(crate) use affine_modes::{CoarseInverse, MODES};
 pub(crate) use block_matrix::{BlockFactor, BlockMatrix};
 pub(crate) use compliance_columns::ComplianceColumns;
@@ -35,6 +37,7 @@ pub(crate) use factor::{FactorScratch, Symbolic};
 pub(crate) use rigid_mode::{SLENDER, rigid_mobility};
 
 pub(crate) use factor_cache::{FactorCache, FactorId, SystemFactor, columns_pay};
+pub use modes::DeformableMode;
 pub(crate) use preconditioner::{BlockForm, Preconditioner};
 pub(crate) use system::{FactorKey, assemble_tangent};
 pub(crate) use unused_factors::STEPS_KEPT;

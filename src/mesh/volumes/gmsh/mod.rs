@@ -4,10 +4,8 @@ mod groups;
 mod sections;
 mod source;
 
-use super::mesh_error::MeshError;
-use super::tet_mesh::TetMesh;
-use sections::Grid;
-use std::collections::HashMap;
+use super::grid::Grid;
+use crate::mesh::{MeshError, TetMesh};
 use std::path::Path;
 
 impl TetMesh {
@@ -35,49 +33,17 @@ impl TetMesh {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn read_gmsh(path: impl AsRef<Path>) -> Result<Self, MeshError> {
-        let path = path.as_ref();
-        let fail = |reason: String| MeshError::File { path: path.display().to_string(), reason };
-        let bytes = std::fs::read(path).map_err(|e| fail(e.to_string()))?;
-        let grid = sections::read(&bytes).map_err(fail)?;
-        let (vertices, tetrahedra) = geometry(&grid).map_err(fail)?;
-        let regions = grid.tetrahedra.iter().map(|(_, _, region)| *region).collect();
-        TetMesh::new(vertices, tetrahedra)?.with_regions(regions).map(|mesh| mesh.with_names(grid.names))
+        super::read_file(path.as_ref(), parse)
     }
 }
 
-type Geometry = (Vec<[f64; 3]>, Vec<[u32; 4]>);
-
-/// Vertices and tetrahedra by indices.
-fn geometry(grid: &Grid) -> Result<Geometry, String> {
+pub(super) fn parse(bytes: &[u8]) -> Result<Grid, String> {
+    let grid = sections::read(bytes)?;
     if grid.tetrahedra.is_empty() {
         let others: Vec<String> =
             grid.others.iter().map(|(kind, count)| format!("{count} of type {kind}")).collect();
         let others = if others.is_empty() { "no elements".to_owned() } else { others.join(", ") };
         return Err(format!("no linear tetrahedra (element type 4) in the file: {others}"));
     }
-    let mut vertices = Vec::new();
-    let mut index_of_tag = HashMap::new();
-    let mut tetrahedra = Vec::with_capacity(grid.tetrahedra.len());
-    for (element, nodes, _) in &grid.tetrahedra {
-        let mut tet = [0; 4];
-        for (corner, tag) in tet.iter_mut().zip(nodes) {
-            let position = grid.positions.get(tag);
-            let position = position
-                .ok_or_else(|| format!("element {element} refers to node {tag}, which is not there"))?;
-            *corner = *index_of_tag.entry(*tag).or_insert_with(|| {
-                vertices.push(*position);
-                vertices.len() as u32 - 1
-            });
-        }
-        tetrahedra.push(positively_oriented(tet, &vertices));
-    }
-    Ok((vertices, tetrahedra))
-}
-
-fn positively_oriented(mut tet: [u32; 4], vertices: &[[f64; 3]]) -> [u32; 4] {
-    let corners = tet.map(|i| vertices[i as usize].into());
-    if super::tet_mesh::signed_volume(&corners) < 0.0 {
-        tet.swap(2, 3);
-    }
-    tet
+    Ok(grid)
 }

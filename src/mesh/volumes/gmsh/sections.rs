@@ -3,7 +3,7 @@
 
 use super::groups::{read_entities, read_names, region_of};
 use super::source::{Encoding, Source};
-use std::collections::{BTreeMap, HashMap};
+use crate::mesh::volumes::grid::Grid;
 
 /// Gmsh's number of tetrahedra of four nodes.
 const TETRAHEDRON: i64 = 4;
@@ -23,20 +23,6 @@ pub(super) enum Version {
     Four,
     /// Coordinates follow the tags of a block.
     FourOne,
-}
-
-/// What is in a file.
-#[derive(Default)]
-pub(super) struct Grid {
-    pub positions: HashMap<i64, [f64; 3]>,
-    /// Tags of tetrahedra, of their nodes, and their physical groups, or 0.
-    pub tetrahedra: Vec<(i64, [i64; 4], u32)>,
-    /// Physical groups of volumes, and their names.
-    pub names: Vec<(u32, String)>,
-    /// The physical group of each entity of three dimensions that is in one.
-    pub regions_of_volumes: HashMap<i64, u32>,
-    /// How many elements of other types there are.
-    pub others: BTreeMap<i64, usize>,
 }
 
 /// Reads what a file holds.

@@ -1,5 +1,8 @@
 //! What a body is made of, in SI units.
 
+mod damping;
+mod presets;
+
 use crate::energy::strain_limit::STIFFENING;
 use crate::energy::{Elasticity, Lame};
 use thiserror::Error;

@@ -1,7 +1,8 @@
 //! Physical groups of volumes: their names, and the entities that are in them.
 
-use super::sections::{Grid, Version, count_in_text};
+use super::sections::{Version, count_in_text};
 use super::source::Source;
+use crate::mesh::volumes::grid::Grid;
 
 /// Dimension of volumes.
 const VOLUME: i64 = 3;

@@ -1,0 +1,24 @@
+//! Files of what has been simulated, for others to read.
+//!
+//! Architecture invariant: reads a world, and changes nothing in it.
+
+#[cfg(feature = "export")]
+mod grid;
+mod obj;
+#[cfg(feature = "export")]
+mod vtk_series;
+
+#[cfg(feature = "export")]
+pub use vtk_series::VtkSeries;
+
+use crate::mesh::MeshError;
+use std::path::Path;
+
+/// Writes a file as a whole.
+fn write(path: &Path, contents: &[u8]) -> Result<(), MeshError> {
+    std::fs::write(path, contents).map_err(|error| failed(path, error.to_string()))
+}
+
+fn failed(path: &Path, reason: String) -> MeshError {
+    MeshError::File { path: path.display().to_string(), reason }
+}
