@@ -20,7 +20,7 @@ pub struct DeformableRest {
     pub is_found: bool,
 }
 
-/// Growth of the step. With two a cantilever takes 1.6 times as many steps, with eight the first steps of soft beams are rejected.
+/// Growth of the step. With two a cantilever takes 8 steps where it takes 5, a gripped box 7 for 5; with eight 4 and 5.
 const GROWTH: f64 = 4.0;
 /// The longest step over the shortest. Beyond, nothing is left of inertia in a matrix of double precision.
 const LONGEST: f64 = 1.0e5;
