@@ -133,6 +133,26 @@ fn rest_is_that_of_damped_dynamics_in_a_tenth_of_the_steps() {
     }
 }
 
+/// Pins that are led stand still for as long as rest is sought, and are led on afterwards; so are rigid bodies.
+#[test]
+fn what_is_led_waits() {
+    let (mut physics, mut world) = cantilever();
+    let belt = RigidBodyBuilder::kinematic_velocity_based().linvel(Vector::X).translation(Vector::Y * 5.0);
+    let (belt, _) = physics.insert(belt, ColliderBuilder::ball(0.1));
+    let handle = world.bodies.iter().next().unwrap().0;
+    let body = &mut world.bodies[handle];
+    let pinned: Vec<usize> = body.pinned().collect();
+    pinned.iter().for_each(|vertex| body.set_pin_velocity(*vertex, Vector::Z).unwrap());
+    let before = body.position(pinned[0]).unwrap();
+    assert!(world.find_rest(&mut physics, 1e-6, 100).is_found);
+    let after = world.bodies[handle].position(pinned[0]).unwrap();
+    assert!((after[2] - before[2]).abs() < 1e-12 && physics.bodies[belt].translation().x == 0.0);
+    assert_eq!(physics.bodies[belt].linvel(), Vector::X);
+    world.step(&mut physics);
+    let led = world.bodies[handle].position(pinned[0]).unwrap();
+    assert!((led[2] - before[2] - 1.0 / 60.0).abs() < 1e-6, "{led:?}");
+}
+
 /// What nothing holds has no rest; what cannot be asked for ends.
 #[test]
 fn what_falls_has_no_rest() {

@@ -209,12 +209,17 @@ fn tractions_integrate_to_the_contact_forces() {
         for handle in [ball, cube] {
             let areas = world.bodies[handle].vertex_areas();
             let tractions = world.contact_tractions(handle).unwrap();
-            let sum = areas.iter().zip(&tractions).map(|(a, t)| *t * *a as f32).sum::<Vector>();
-            let on_floor = world.contact_force(handle, floor);
-            let other = if handle == ball { cube } else { ball };
-            let expected = on_floor + world.pair_force(handle, other);
-            let scale = 1.0 + expected.length();
-            assert!((sum - expected).length() < 1e-5 * scale, "{sum} {expected}");
+            let sum: Vector3<f64> = areas.iter().zip(&tractions).map(|(a, t)| Vector3::from(*t) * *a).sum();
+            // Each force is f32, their sum is not.
+            let exact = |force: Vector| Vector3::from(force.to_array().map(f64::from));
+            let on_floor = world.contacts_of(handle).map(|c| exact(c.force)).sum::<Vector3<f64>>();
+            let of_pair = |c: &DeformablePairContact| match handle {
+                own if own == c.body1 => exact(c.force),
+                _ => -exact(c.force),
+            };
+            let between = world.pair_contacts().iter().map(of_pair).sum::<Vector3<f64>>();
+            let expected = on_floor + between;
+            assert!((sum - expected).norm() < 1e-9 * (1.0 + expected.norm()), "{sum} {expected}");
         }
     }
     let carried = world.contact_force(ball, floor).y;
@@ -224,5 +229,14 @@ fn tractions_integrate_to_the_contact_forces() {
     let body = &world.bodies[cube];
     let elastic: f64 = body.elastic_forces().iter().map(|f| f[1]).sum();
     assert!(elastic.abs() < 1e-3 * f64::from(weight), "inner forces have no sum: {elastic}");
-    assert!(world.contact_tractions(ball).unwrap().iter().any(|t| t.y > 1000.0));
+    assert!(world.contact_tractions(ball).unwrap().iter().any(|t| t[1] > 1000.0));
+    // A cube stands on all of its face; the cap of a ball is less than its section.
+    let mut flat = DeformableWorld::new();
+    let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [3; 3]).material(material);
+    let cube = flat.insert(cube.translation(Vector::Y * 0.2)).unwrap();
+    (0..60).for_each(|_| flat.step(&mut physics));
+    let area = flat.contact_area(cube).unwrap();
+    assert!((area / 0.04 - 1.0).abs() < 0.01, "{area} m²");
+    let cap = world.contact_area(ball).unwrap();
+    assert!(cap > 0.0 && cap < std::f64::consts::PI * 0.2 * 0.2, "{cap} m²");
 }

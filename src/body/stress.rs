@@ -127,6 +127,17 @@ impl DeformableBody {
         self.in_user_order(&of_node)
     }
 
+    /// Area of now of the surface's triangles all of whose vertices are meant \[m²\].
+    pub(crate) fn area_within(&self, is_meant: impl Fn(usize) -> bool) -> f64 {
+        let x = &self.state.x;
+        let meant = |triangle: &&[u32; 3]| triangle.iter().all(|n| is_meant(self.model.vertex(*n as usize)));
+        let area = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|n| x[n as usize]);
+            0.5 * (b - a).cross(&(c - a)).norm()
+        };
+        self.model.surface.triangles.iter().filter(meant).map(area).sum()
+    }
+
     fn in_user_order<T: Copy>(&self, of_node: &[T]) -> Vec<T> {
         (0..of_node.len()).filter_map(|vertex| Some(of_node[self.model.node(vertex)?])).collect()
     }

@@ -2,7 +2,6 @@
 
 use crate::body::DeformableBody;
 use crate::pipeline::DeformableWorld;
-use rapier3d::math::Vector;
 use vtkio::model::{Attribute, Attributes, CellType, Cells, DataArray, UnstructuredGridPiece, VertexNumbers};
 
 /// Lists of the grid while it is put together.
@@ -62,14 +61,14 @@ pub(super) fn grid(world: &DeformableWorld) -> UnstructuredGridPiece {
 }
 
 impl Lists {
-    fn add_points(&mut self, body: &DeformableBody, tractions: &[Vector]) {
+    fn add_points(&mut self, body: &DeformableBody, tractions: &[[f64; 3]]) {
         for node in body.model().nodes_by_vertex() {
             let (x, rest) = (body.state().x[node], body.model().rest[node]);
             self.points.extend(x.iter());
             self.displacement.extend((x - rest).iter().map(|c| *c as f32));
             self.velocity.extend(body.state().v[node].iter().map(|c| *c as f32));
         }
-        self.traction.extend(tractions.iter().flat_map(|t| [t.x, t.y, t.z]));
+        self.traction.extend(tractions.iter().flatten().map(|t| *t as f32));
         self.traction.resize(self.points.len(), 0.0);
     }
 

@@ -40,13 +40,15 @@ const RIGID_REST: f64 = 1.0e-3;
 struct Kept {
     settings: SolverSettings,
     can_sleep: bool,
+    /// Velocities of pins.
+    led: Vec<Vec3>,
 }
 
 impl DeformableWorld {
     /// Brings all bodies, and the dynamic rigid ones with them, to where they rest under their loads, pins, attachments and
     /// contacts, in far fewer steps than it takes in time: each step begins without velocities. Loads are gravity, forces and
-    /// tractions ([`DeformableBody::add_force`], [`DeformableBody::add_traction`]), displacements are pins. Rigid bodies that are led
-    /// stand still meanwhile. Ends when no force out of balance is above `tolerance` of the forces, or after `max_steps`.
+    /// tractions ([`DeformableBody::add_force`], [`DeformableBody::add_traction`]), displacements are pins. Rigid bodies and pins that are
+    /// led by a velocity stand still meanwhile; deformable bodies that are so move on with it. Ends when no force out of balance is above `tolerance` of the forces, or after `max_steps`.
     ///
     /// Where friction holds, what it ends in depends on where it began, as in time. What nothing holds has no rest and falls.
     ///
@@ -118,7 +120,8 @@ impl DeformableWorld {
 }
 
 fn begin(body: &mut DeformableBody, tolerance: f64) -> Kept {
-    let kept = Kept { settings: *body.settings(), can_sleep: body.can_sleep() };
+    let led = body.pins.iter_mut().map(|pin| std::mem::take(&mut pin.velocity)).collect();
+    let kept = Kept { settings: *body.settings(), can_sleep: body.can_sleep(), led };
     let settings = kept.settings.max_iterations(ITERATIONS).tolerance(SHARPER * tolerance);
     body.set_settings(settings.integrator(Integrator::ImplicitEuler).contact_tolerance(SHARPER * tolerance));
     body.set_can_sleep(false);
@@ -130,6 +133,7 @@ fn end(body: &mut DeformableBody, kept: Kept) {
     body.set_settings(kept.settings);
     body.set_can_sleep(kept.can_sleep);
     body.distribute_materials();
+    body.pins.iter_mut().zip(kept.led).for_each(|(pin, velocity)| pin.velocity = velocity);
 }
 
 /// Takes all velocities away.

@@ -184,17 +184,23 @@ impl DeformableWorld {
     }
 
     /// Force per area \[Pa\] of all contacts of the last step on each vertex of a body, those with deformable bodies and itself
-    /// included: times [`DeformableBody::vertex_areas`] it sums to the contact forces. Zero at vertices without a surface.
+    /// included: times [`DeformableBody::vertex_areas`] it sums to the contact forces, in the solver's precision. Zero at vertices without a
+    /// surface.
     ///
     /// # Errors
     /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody).
-    pub fn contact_tractions(&self, body: DeformableBodyHandle) -> Result<Vec<Vector>, DeformableBodyError> {
+    pub fn contact_tractions(
+        &self,
+        body: DeformableBodyHandle,
+    ) -> Result<Vec<[f64; 3]>, DeformableBodyError> {
         let areas = self.bodies.get(body).ok_or_else(|| body.no_such_body())?.vertex_areas();
-        let mut tractions = vec![Vector::ZERO; areas.len()];
+        let mut tractions = vec![[0.0; 3]; areas.len()];
         let mut add = |vertices: &[usize; 3], weights: &[f64; 3], force: Vector| {
             for (vertex, weight) in vertices.iter().zip(weights) {
                 if areas[*vertex] > 0.0 {
-                    tractions[*vertex] += force * (weight / areas[*vertex]) as f32;
+                    let share = weight / areas[*vertex];
+                    let own = tractions[*vertex].iter_mut().zip(force.to_array());
+                    own.for_each(|(t, f)| *t += f64::from(f) * share);
                 }
             }
         };
@@ -206,6 +212,17 @@ impl DeformableWorld {
             }
         }
         Ok(tractions)
+    }
+
+    /// Area \[m²\] on which contacts of the last step press a body: that of the triangles of its surface all of whose corners they
+    /// press. What is touched at points and along edges has none.
+    ///
+    /// # Errors
+    /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody).
+    pub fn contact_area(&self, body: DeformableBodyHandle) -> Result<f64, DeformableBodyError> {
+        let is_pressed: Vec<bool> = self.contact_tractions(body)?.iter().map(|t| *t != [0.0; 3]).collect();
+        let body = self.bodies.get(body).ok_or_else(|| body.no_such_body())?;
+        Ok(body.area_within(|vertex| is_pressed[vertex]))
     }
 
     /// Contacts between rigid bodies that the last step solved: of those that deformables touch, or that

@@ -42,11 +42,15 @@ impl DeformableBody {
     /// ```
     /// use foible3d::prelude::*;
     /// use rapier3d::prelude::*;
-    /// let bar = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.02, 0.02), [25, 1, 1]);
+    /// let bar = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.1, 0.1), [20, 4, 4]);
     /// let bar = bar.material(DeformableMaterial::new(1.0e7, 0.0)).pinned(|x| x.x < -0.499).build()?;
-    /// let modes = bar.modes(6)?;
+    /// let modes = bar.modes(12)?;
     /// // The first along the bar: a quarter of a wave at the speed √(E/ρ).
-    /// let along = modes.iter().find(|mode| mode.shape.iter().map(|v| v[0] * v[0]).sum::<f64>() > 0.4).unwrap();
+    /// let is_along = |mode: &&DeformableMode| {
+    ///     let [x, y, z] = [0, 1, 2].map(|k| mode.shape.iter().map(|v| v[k] * v[k]).sum::<f64>());
+    ///     x > y + z
+    /// };
+    /// let along = modes.iter().find(is_along).unwrap();
     /// assert!((along.frequency / (100.0 / 4.0) - 1.0).abs() < 0.01);
     /// # Ok::<(), DeformableBodyError>(())
     /// ```
