@@ -48,7 +48,7 @@ impl DeformableWorld {
     /// Brings all bodies, and the dynamic rigid ones with them, to where they rest under their loads, pins, attachments and
     /// contacts, in far fewer steps than it takes in time: each step begins without velocities. Loads are gravity, forces and
     /// tractions ([`DeformableBody::add_force`], [`DeformableBody::add_traction`]), displacements are pins. Rigid bodies and pins that are
-    /// led by a velocity stand still meanwhile; deformable bodies that are so move on with it. Ends when no force out of balance is above `tolerance` of the forces, or after `max_steps`.
+    /// led by a velocity stand still meanwhile; deformable bodies that are led so do not. Ends when no force out of balance is above `tolerance` of the forces, or after `max_steps`.
     ///
     /// Where friction holds, what it ends in depends on where it began, as in time. What nothing holds has no rest and falls.
     ///

@@ -25,7 +25,7 @@ pub(super) fn check_vertices(vertices: &[Vector], triangles: &[[u32; 3]]) -> Res
 }
 
 /// Whether as many triangles pass along each edge one way as the other. Vertices at the same place are one.
-pub(super) fn check_closed(vertices: &[Vector], triangles: &[[u32; 3]]) -> Result<(), MeshError> {
+pub(in crate::mesh) fn check_closed(vertices: &[Vector], triangles: &[[u32; 3]]) -> Result<(), MeshError> {
     let places: Vec<Vec3> = vertices.iter().map(|v| from_real(*v)).collect();
     let mut passes: BTreeMap<[u32; 2], i32> = BTreeMap::new();
     for [a, b, c] in merged(&places, triangles) {
@@ -57,7 +57,7 @@ pub(super) fn check_sizes(shape: &dyn Shape) -> Result<(), MeshError> {
 }
 
 /// Volume that triangles enclose \[m³\], negative if they are wound inward.
-pub(super) fn signed_volume_of(vertices: &[Vector], triangles: &[[u32; 3]]) -> f64 {
+pub(in crate::mesh) fn signed_volume_of(vertices: &[Vector], triangles: &[[u32; 3]]) -> f64 {
     let Some(first) = vertices.first().map(|v| from_real(*v)) else { return 0.0 };
     let volume = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| from_real(vertices[i as usize]) - first);

@@ -8,10 +8,10 @@ mod weld;
 
 pub use report::{SurfaceFault, SurfaceReport};
 
+use super::fill::{check_closed, signed_volume_of};
 use super::mesh_error::MeshError;
 use super::surface::sorted_face;
 use super::tet_mesh::TetMesh;
-use crate::math::{Vec3, from_real};
 use holes::fill_holes;
 use orientation::orient;
 use rapier3d::math::Vector;
@@ -90,9 +90,9 @@ impl SurfaceMesh {
 
     /// What it encloses \[m³\]; negative if it is wound inward, and of no meaning if it is open.
     pub fn volume(&self) -> f64 {
-        let corner = |v: u32| self.vertices.get(v as usize).map_or(Vec3::zeros(), |v| from_real(*v));
-        let signed = |t: &[u32; 3]| corner(t[0]).dot(&corner(t[1]).cross(&corner(t[2]))) / 6.0;
-        self.triangles.iter().map(signed).sum()
+        let is_there = |triangle: &&[u32; 3]| triangle.iter().all(|v| (*v as usize) < self.vertices.len());
+        let triangles: Vec<[u32; 3]> = self.triangles.iter().filter(is_there).copied().collect();
+        signed_volume_of(&self.vertices, &triangles)
     }
 
     /// Fills it with tetrahedra, see [`TetMesh::fill_surface`].
@@ -124,11 +124,13 @@ impl SurfaceMesh {
         if mesh.triangles.is_empty() {
             return Err(MeshError::Empty);
         }
-        done.turned = orient(&mut mesh, false);
+        let as_given = mesh.triangles.clone();
+        orient(&mut mesh, false);
         done.holes = fill_holes(&mut mesh, repair.hole_edges);
         // Which way is out is known when it is closed.
-        done.turned += orient(&mut mesh, true);
-        mesh.check_closed()?;
+        orient(&mut mesh, true);
+        done.turned = as_given.iter().zip(&mesh.triangles).filter(|(a, b)| a != b).count();
+        check_closed(&mesh.vertices, &mesh.triangles)?;
         mesh.drop_unused();
         Ok((mesh, done))
     }
@@ -159,14 +161,6 @@ impl SurfaceMesh {
         Self { vertices, triangles: triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect() }
     }
 
-    fn check_closed(&self) -> Result<(), MeshError> {
-        let edges = self.edges();
-        let mut open = edges.iter().filter(|(_, uses)| uses.forward != uses.backward);
-        let Some(([a, b], _)) = open.next() else { return Ok(()) };
-        let middle = [a, b].map(|v| from_real(self.vertices[*v as usize]));
-        Err(MeshError::OpenSurface { edges: 1 + open.count(), at: ((middle[0] + middle[1]) * 0.5).into() })
-    }
-
     /// Largest distance from the middle of what is finite, along an axis \[m\].
     fn extent(&self) -> f32 {
         let finite = || self.vertices.iter().filter(|v| v.is_finite());
@@ -176,13 +170,13 @@ impl SurfaceMesh {
         if half.is_finite() { half } else { 0.0 }
     }
 
-    /// Edges with the triangles that pass along them, from the lower vertex to the higher and back.
+    /// Edges with the triangles that pass along them.
     fn edges(&self) -> BTreeMap<[u32; 2], EdgeUses> {
         let mut edges: BTreeMap<[u32; 2], EdgeUses> = BTreeMap::new();
         for (triangle, [a, b, c]) in self.triangles.iter().enumerate() {
             for [p, q] in [[a, b], [b, c], [c, a]] {
                 let uses = edges.entry([*p.min(q), *p.max(q)]).or_default();
-                *if p < q { &mut uses.forward } else { &mut uses.backward } += 1;
+                uses.forward += usize::from(p < q);
                 uses.triangles.push(triangle as u32);
             }
         }
@@ -193,7 +187,7 @@ impl SurfaceMesh {
 /// The triangles on an edge.
 #[derive(Clone, Debug, Default)]
 struct EdgeUses {
+    /// How many pass from the lower vertex to the higher.
     forward: usize,
-    backward: usize,
     triangles: Vec<u32>,
 }

@@ -5,9 +5,8 @@ use crate::math::from_real;
 use rapier3d::math::Vector;
 
 /// Winds the triangles of each piece alike; with `outward` the outermost pieces also so that they enclose a positive volume, and
-/// with them what is inside of them: cavities stay cavities. The number of triangles that were turned.
-pub(super) fn orient(mesh: &mut SurfaceMesh, outward: bool) -> usize {
-    let before = mesh.triangles.clone();
+/// with them what is inside of them: cavities stay cavities.
+pub(super) fn orient(mesh: &mut SurfaceMesh, outward: bool) {
     let pieces = wind_alike(mesh);
     if outward {
         let boxes: Vec<[Vector; 2]> = pieces.iter().map(|piece| bounds(mesh, piece)).collect();
@@ -23,7 +22,6 @@ pub(super) fn orient(mesh: &mut SurfaceMesh, outward: bool) -> usize {
             }
         }
     }
-    before.iter().zip(&mesh.triangles).filter(|(a, b)| a != b).count()
 }
 
 /// Pieces of triangles that share edges, each wound as most of its triangles were.
