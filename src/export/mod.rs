@@ -16,9 +16,5 @@ use std::path::Path;
 
 /// Writes a file as a whole.
 fn write(path: &Path, contents: &[u8]) -> Result<(), MeshError> {
-    std::fs::write(path, contents).map_err(|error| failed(path, error.to_string()))
-}
-
-fn failed(path: &Path, reason: String) -> MeshError {
-    MeshError::File { path: path.display().to_string(), reason }
+    std::fs::write(path, contents).map_err(|error| MeshError::file(path, error))
 }

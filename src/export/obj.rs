@@ -1,6 +1,6 @@
 //! Wavefront OBJ: the surfaces of bodies as objects of one file.
 
-use super::{failed, write};
+use super::write;
 use crate::mesh::MeshError;
 use crate::pipeline::DeformableWorld;
 use crate::skin::{DeformableSkin, DeformableSurfaceMesh};
@@ -36,7 +36,7 @@ impl DeformableWorld {
             let skin = DeformableSkin::bind(body.model(), &mesh.vertices, &mesh.normals);
             // A body's own surface is bound to it.
             let drawn = skin.and_then(|skin| skin.update(body, &mut mesh.vertices, &mut mesh.normals));
-            drawn.map_err(|error| failed(path, error.to_string()))?;
+            drawn.map_err(|error| MeshError::file(path, error))?;
             // Writing to a string does not fail.
             let _ = writeln!(text, "o body_{k}");
             for (kind, all) in [("v", &mesh.vertices), ("vn", &mesh.normals)] {

@@ -1,7 +1,7 @@
 //! VTK: a file of all bodies, and a series of such with their times.
 
 use super::grid::grid;
-use super::{failed, write};
+use super::write;
 use crate::mesh::MeshError;
 use crate::pipeline::DeformableWorld;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ impl DeformableWorld {
             file_path: None,
         };
         let mut bytes = Vec::new();
-        file.write_xml(&mut bytes).map_err(|error| failed(path, error.to_string()))?;
+        file.write_xml(&mut bytes).map_err(|error| MeshError::file(path, error))?;
         write(path, &bytes)
     }
 }

@@ -1,5 +1,6 @@
 //! What can be wrong with a mesh.
 
+use std::path::Path;
 use thiserror::Error;
 
 /// What is wrong with a mesh.
@@ -215,4 +216,11 @@ pub enum MeshError {
         /// What is wrong with it.
         reason: String,
     },
+}
+
+impl MeshError {
+    /// Of a file, as it was named.
+    pub(crate) fn file(path: &Path, reason: impl ToString) -> Self {
+        Self::File { path: path.display().to_string(), reason: reason.to_string() }
+    }
 }

@@ -32,7 +32,7 @@ impl SurfaceMesh {
     /// [`MeshError::File`]: not there, of another format, or not as its format asks.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, MeshError> {
         let path = path.as_ref();
-        let said = |reason: String| MeshError::File { path: path.display().to_string(), reason };
+        let said = |reason: String| MeshError::file(path, reason);
         let format = path.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
         let bytes = std::fs::read(path).map_err(|error| said(error.to_string()))?;
         Self::parse(&format, &bytes, path.parent()).map_err(said)

@@ -46,24 +46,21 @@ impl TetMesh {
             #[cfg(feature = "import")]
             "vtk" | "vtu" => read_file(path, vtk::parse),
             #[cfg(not(feature = "import"))]
-            "vtk" | "vtu" => Err(failed(path, "VTK files want the feature `import`".into())),
-            other => {
-                Err(failed(path, format!("`{other}` is none of the formats msh, mesh, node, ele, vtk, vtu")))
-            }
+            "vtk" | "vtu" => Err(MeshError::file(path, "VTK files want the feature `import`")),
+            other => Err(MeshError::file(
+                path,
+                format!("`{other}` is none of the formats msh, mesh, node, ele, vtk, vtu"),
+            )),
         }
     }
 }
 
 /// Reads a file and makes a mesh of what is in it.
 fn read_file(path: &Path, parse: impl Fn(&[u8]) -> Result<Grid, String>) -> Result<TetMesh, MeshError> {
-    let fail = |reason| failed(path, reason);
+    let fail = |reason| MeshError::file(path, reason);
     parse(&contents(path)?).map_err(fail)?.into_mesh(fail)
 }
 
 fn contents(path: &Path) -> Result<Vec<u8>, MeshError> {
-    std::fs::read(path).map_err(|error| failed(path, error.to_string()))
-}
-
-fn failed(path: &Path, reason: String) -> MeshError {
-    MeshError::File { path: path.display().to_string(), reason }
+    std::fs::read(path).map_err(|error| MeshError::file(path, error))
 }

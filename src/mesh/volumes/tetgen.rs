@@ -1,8 +1,8 @@
 //! TetGen: `.node` with the points and `.ele` with the tetrahedra, of four nodes or ten, numbered from nought or one [Si 2015].
 
+use super::contents;
 use super::grid::Grid;
 use super::words::Words;
-use super::{contents, failed};
 use crate::mesh::{MeshError, TetMesh};
 use std::path::Path;
 
@@ -10,8 +10,8 @@ use std::path::Path;
 pub(super) fn read(path: &Path) -> Result<TetMesh, MeshError> {
     let [nodes, elements] = ["node", "ele"].map(|extension| path.with_extension(extension));
     let mut grid = Grid::default();
-    read_nodes(&contents(&nodes)?, &mut grid).map_err(|reason| failed(&nodes, reason))?;
-    let fail = |reason| failed(&elements, reason);
+    read_nodes(&contents(&nodes)?, &mut grid).map_err(|reason| MeshError::file(&nodes, reason))?;
+    let fail = |reason| MeshError::file(&elements, reason);
     read_elements(&contents(&elements)?, &mut grid).map_err(fail)?;
     grid.into_mesh(fail)
 }
