@@ -2,6 +2,7 @@
 //! in version 4, with points, lines, triangles and a physical group), others by a writer here, whole and damaged.
 use foible3d::{MeshError, TetMesh};
 use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
 use std::path::{Path, PathBuf};
 
 const FILES: [&str; 6] = ["2.2", "2.2_parametric", "2.2_binary", "4.0", "4.1", "4.1_binary"];
@@ -292,17 +293,28 @@ proptest! {
             prop_assert_eq!(found.region_named("a stiff back"), Some(3));
         }
     }
+}
 
-    #[test]
-    fn damaged_files_are_errors_or_meshes(
-        k in 0..FORMATS.len(), at in 0.0..1.0f64, byte in any::<u8>(), cut in any::<bool>(),
-    ) {
-        let mut bytes = written(&block(), &(1..25).collect::<Vec<i64>>(), FORMATS[k]);
-        let at = (at * bytes.len() as f64) as usize;
-        if cut { bytes.truncate(at) } else { bytes[at] = byte }
-        if let Err(error) = read("damaged", &bytes) {
-            prop_assert!(!error.to_string().is_empty());
-        }
+/// Ten thousand of each format.
+#[test]
+fn damaged_files_are_errors_or_meshes() {
+    for format in FORMATS {
+        let whole = written(&block(), &(1..25).collect::<Vec<i64>>(), format);
+        let mut runner = TestRunner::new(Config { failure_persistence: None, ..Config::with_cases(10_000) });
+        let result = runner.run(&(0.0..1.0f64, any::<u8>(), any::<bool>()), |(at, byte, cut)| {
+            let mut bytes = whole.clone();
+            let at = (at * bytes.len() as f64) as usize;
+            if cut {
+                bytes.truncate(at)
+            } else {
+                bytes[at] = byte
+            }
+            if let Err(error) = read("damaged", &bytes) {
+                prop_assert!(!error.to_string().is_empty());
+            }
+            Ok(())
+        });
+        result.unwrap_or_else(|error| panic!("{format:?}: {error}"));
     }
 }
 

@@ -239,4 +239,11 @@ fn sheet_pulled_along_its_length_has_youngs_modulus_and_poissons_ratio() {
     );
     // Uniform strain, linear in the stretch: a residual of 1e-6 of the forces is left.
     assert!(off.iter().all(|o| o.abs() < 1e-3), "{off:?}");
+    // Pull per section; a Cauchy stress, over a section that is narrower by Poisson's ratio.
+    let along = pull / (0.2 * f64::from(thickness)) / (1.0 - narrower);
+    for stress in body.sheet_stresses() {
+        let [[xx, xy, xz], [_, yy, yz], [.., zz]] = stress.cauchy;
+        assert!((xx / along - 1.0).abs() < 1e-3, "{xx} of {along} Pa");
+        assert!([xy, xz, yy, yz, zz].iter().all(|s| s.abs() < 1e-3 * along), "{:?}", stress.cauchy);
+    }
 }

@@ -1,7 +1,7 @@
 //! Stress, strain and inner forces, to be read.
 
 use super::body::DeformableBody;
-use crate::fem::{ElementState, element_states};
+use crate::fem::{ElementState, element_states, section_forces, sheet_stresses};
 use crate::math::{Mat3, Vec3, to_real};
 use rapier3d::math::Vector;
 
@@ -88,6 +88,38 @@ impl DeformableBody {
         }
         let mean = |(sum, volume): (Mat3, f64)| if volume > 0.0 { sum / volume } else { sum };
         sums.into_iter().map(|sum| mean(sum).into()).collect()
+    }
+
+    /// Stress in the middle plane of each triangle of the sheets, in the order of
+    /// [`DeformableModel::sheet_triangles`](crate::DeformableModel::sheet_triangles): force per length over the thickness at rest.
+    /// What bending adds on either side and damping are not in it.
+    pub fn sheet_stresses(&self) -> Vec<DeformableStress> {
+        let all = sheet_stresses(&self.model, &self.materials, &self.state.x);
+        all.into_iter().map(Into::into).collect()
+    }
+
+    /// Tension of each segment of the rods \[N\], negative when pressed, in the order of
+    /// [`DeformableModel::rod_segments`](crate::DeformableModel::rod_segments).
+    ///
+    /// ```
+    /// use foible3d::prelude::*;
+    /// use rapier3d::prelude::*;
+    /// let rope = DeformableBodyBuilder::rope(&[Vector::ZERO, Vector::X], 0.01);
+    /// let mut rope = rope.material(DeformableMaterial::new(1.0e6, 0.3)).build()?;
+    /// rope.set_position(1, [1.01, 0.0, 0.0])?;
+    /// // E A ε
+    /// assert!((rope.rod_tensions()[0] - 1.0e6 * 1.0e-4 * std::f64::consts::PI * 0.01).abs() < 1e-5);
+    /// # Ok::<(), DeformableBodyError>(())
+    /// ```
+    pub fn rod_tensions(&self) -> Vec<f64> {
+        section_forces(&self.model, &self.materials, &self.state.x).0
+    }
+
+    /// The bending moments of rods \[N·m\], about their direction: of each vertex between two segments, with the vertex, in the order
+    /// of the rods.
+    pub fn rod_moments(&self) -> Vec<(usize, [f64; 3])> {
+        let moments = section_forces(&self.model, &self.materials, &self.state.x).1;
+        moments.into_iter().map(|(node, moment)| (self.model.vertex(node as usize), moment.into())).collect()
     }
 
     /// Green's strain `(FᵀF − 1)/2` of each tetrahedron: which no rotation changes.

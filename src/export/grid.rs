@@ -90,9 +90,12 @@ impl Lists {
     }
 
     fn add_thin(&mut self, body: &DeformableBody, first: u64) {
-        for (corners, region) in body.model().sheet_triangles() {
+        for ((corners, region), stress) in body.model().sheet_triangles().zip(body.sheet_stresses()) {
             self.add_cell(CellType::Triangle, &corners, first, region);
-            self.add_no_stress();
+            self.stress.extend(stress.cauchy.iter().flatten().map(|c| *c as f32));
+            self.von_mises.push(stress.von_mises() as f32);
+            self.strain.extend([f32::NAN; 9]);
+            self.density.push(f32::NAN);
         }
         for (ends, region) in body.model().rod_segments() {
             self.add_cell(CellType::Line, &ends, first, region);

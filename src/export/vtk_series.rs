@@ -17,7 +17,7 @@ impl DeformableWorld {
     /// | `velocity` | points | [m/s] |
     /// | `traction` | points | of all contacts of the last step \[Pa\] |
     /// | `body`, `region` | cells | the place of the body in the set, counted from nought; the region |
-    /// | `cauchy_stress` | cells | nine components \[Pa\]; NaN of what is thin |
+    /// | `cauchy_stress` | cells | nine components \[Pa\]; of sheets that of the middle plane, of rods NaN |
     /// | `von_mises` | cells | \[Pa\] |
     /// | `green_strain` | cells | nine components \[–\] |
     /// | `energy_density` | cells | per volume at rest [J/m³] |

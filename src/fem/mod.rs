@@ -30,5 +30,5 @@ pub(crate) use frames::{floating_frame, node_rotations, volume};
 pub use model::DeformableModel;
 pub(crate) use model::{Build, Elements};
 pub(crate) use stiffness_damping::StiffnessDamping;
-pub(crate) use stresses::{ElementState, element_states};
+pub(crate) use stresses::{ElementState, element_states, section_forces, sheet_stresses};
 pub(crate) use tangents::add_tangents;

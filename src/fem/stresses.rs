@@ -3,8 +3,11 @@
 //! Cauchy stress `σ = P Fᵀ / det F`. A tetrahedron of a smoothed body has the mean of those around its edges, of shape, and that
 //! of its patch, of volume: together they are worth what the domains are, `Σ V_e σ_e = Σ V_d σ_d`.
 
+use super::elements::TriangleElement;
 use super::model::DeformableModel;
 use super::regions::Region;
+use super::thin_elements::{length_energy, membrane};
+use crate::energy::stencil::StencilKind;
 use crate::energy::{ElementEnergy, Lame, with_energy};
 use crate::material::DeformableMaterial;
 use crate::math::lanes::{LANES, LaneMat3};
@@ -48,6 +51,48 @@ pub(crate) fn element_states(
         }
     }
     states
+}
+
+/// Cauchy stress \[Pa\] in the middle plane of each triangle, in the order of the model's: force per area of the section as it is
+/// across at rest, `P Fᵀ` over the ratio of areas.
+pub(crate) fn sheet_stresses(
+    model: &DeformableModel,
+    materials: &[DeformableMaterial],
+    x: &[Vec3],
+) -> Vec<Mat3> {
+    let stress = |triangle: &TriangleElement| {
+        let F = triangle.deformation_gradient(x);
+        let P = membrane(&materials[triangle.region as usize]).evaluate(&F).stress;
+        let stress = P * F.transpose() / F.column(0).cross(&F.column(1)).norm().max(FLATTEST);
+        (stress + stress.transpose()) * 0.5
+    };
+    model.triangles.iter().map(stress).collect()
+}
+
+/// Of each segment of the rods its tension \[N\], in the order of the model's; and the moments \[N·m\] at the nodes where they bend.
+pub(crate) fn section_forces(
+    model: &DeformableModel,
+    materials: &[DeformableMaterial],
+    x: &[Vec3],
+) -> (Vec<f64>, Vec<(u32, Vec3)>) {
+    let (mut tensions, mut moments) = (Vec::new(), Vec::new());
+    for stencil in &model.stencils {
+        let b = stencil.vector(x);
+        let pull = length_energy(stencil, materials, 1.0).response(&b).1;
+        match stencil.kind {
+            // Over the length at rest, as energy has it: the pull is along b.
+            StencilKind::Stretch => tensions.push(pull.dot(&b) / b.norm().max(f64::MIN_POSITIVE)),
+            StencilKind::RodBending => {
+                let [before, at, after] = [0, 1, 2].map(|k| x[stencil.nodes[k] as usize]);
+                let along = ((at - before).normalize() + (after - at).normalize()).normalize();
+                moments.push((stencil.nodes[1], along.cross(&pull)));
+            }
+            _ => {}
+        }
+    }
+    // Those of springs come after those of rods.
+    tensions.truncate(model.rod_segments().count());
+    (tensions, moments)
 }
 
 /// What the domains of a region contribute to its tetrahedra.
