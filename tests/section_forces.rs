@@ -34,7 +34,11 @@ fn a_segment_carries_what_hangs_below_it() {
     let below = |k: usize| 3.0 + rope.mass() * gravity * (19.5 - k as f64) / 20.0;
     for (k, tension) in rope.rod_tensions().into_iter().enumerate() {
         // Bends resist what one segment is stretched more than the next, too: (r/l)² of the share of a segment.
-        assert!((tension - below(k)).abs() < 0.5 * 0.01 * rope.mass() * gravity / 20.0, "segment {k}: {tension} of {} N", below(k));
+        assert!(
+            (tension - below(k)).abs() < 0.5 * 0.01 * rope.mass() * gravity / 20.0,
+            "segment {k}: {tension} of {} N",
+            below(k)
+        );
     }
     assert!(rope.rod_moments().iter().all(|(_, m)| m.iter().all(|m| m.abs() < 1e-9)));
 }
@@ -80,7 +84,11 @@ fn reactions_sum_to_the_load() {
         // Vertex by vertex: elasticity pulls pinned ones with what the pin takes, but for their own weight.
         let elastic = bar.elastic_forces();
         let pulled: f64 = bar.pinned().map(|v| elastic[v][0]).sum();
-        println!("reactions off by {off:.1e} N of {:.1} N, elastic ones by {:.1e} N", expected[1], pulled - 2.0);
+        println!(
+            "reactions off by {off:.1e} N of {:.1} N, elastic ones by {:.1e} N",
+            expected[1],
+            pulled - 2.0
+        );
         assert!(off < 1e-9 * expected[1], "{held:?} {expected:?}");
         assert!((pulled - 2.0).abs() < 1e-9 * expected[1], "{pulled}");
         // Inner vertices: nothing is left.
