@@ -104,7 +104,7 @@ pub use error::{BodyError, DeformableBodyError, HandleError};
 #[cfg(feature = "export")]
 pub use export::VtkSeries;
 pub use fem::{DeformableModel, SystemMatrix};
-pub use material::{DeformableMaterial, MaterialError};
+pub use material::{DeformableMaterial, MaterialError, MaxwellBranch};
 pub use mesh::{
     MeshError, Structure, SurfaceFault, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, TetMesh,
 };
@@ -130,8 +130,9 @@ pub mod prelude {
         DeformableModel, DeformablePairContact, DeformablePairFilterContext, DeformableParameters,
         DeformablePipeline, DeformableRest, DeformableSkin, DeformableSolverContact, DeformableStress,
         DeformableSurfaceMesh, DeformableSurfacePoint, DeformableWind, DeformableWorld, Elasticity,
-        FactorPrecision, Fidelity, Frames, Integrator, JointForce, JointRole, PhysicsParts, RigidContact,
-        SolvedJoint, Solver, SolverSettings, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix, TetMesh,
+        FactorPrecision, Fidelity, Frames, Integrator, JointForce, JointRole, MaxwellBranch, PhysicsParts,
+        RigidContact, SolvedJoint, Solver, SolverSettings, Structure, SurfaceMesh, SurfaceRepair,
+        SystemMatrix, TetMesh,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

@@ -108,6 +108,7 @@ impl DeformableBody {
             shared: Vec::new(),
             impacts: Vec::new(),
             pair_data: Vec::new(),
+            dampers: Vec::new(),
             history: History::default(),
             sleep: Sleep::default(),
             factor_base: FactorBase::default(),
@@ -166,7 +167,7 @@ impl DeformableBody {
         if state.x.len() != self.state.x.len() {
             return Err(BodyError::WrongSize { vertices: state.x.len(), expected: self.state.x.len() });
         }
-        state.check(self.state.x.len()).map_err(|what| BodyError::BadState { what })?;
+        state.check(&self.model).map_err(|what| BodyError::BadState { what })?;
         self.state = state;
         self.before.clear();
         // Contacts of another mesh of the same size would name nodes that are not on this surface.

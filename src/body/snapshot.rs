@@ -23,7 +23,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 /// Of what is written. Another one is refused: numbers of another layout would be read as something else.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// Comes first, so that nothing of another version is read.
 #[derive(Serialize)]
@@ -233,7 +233,7 @@ impl DeformableBody {
             return Err("its regions are not those of its model".to_string());
         }
         self.distribute_materials();
-        self.state.check(count).map_err(str::to_string)?;
+        self.state.check(&self.model).map_err(str::to_string)?;
         let are_pins = |pins: &[Pin]| {
             pins.is_sorted_by(|a, b| a.node < b.node)
                 && pins.last().is_none_or(|pin| (pin.node as usize) < count)

@@ -4,6 +4,7 @@ use super::constraint_memory::{ConstraintKey, ConstraintMemory};
 use super::factor_base::FactorBase;
 use super::handle::DeformableBodyHandle;
 use super::impact::{Impact, Partner};
+use crate::fem::{Dampers, DeformableModel, are_dampers};
 use crate::math::{Pose64, Vec3};
 use rapier3d::dynamics::RigidBodyHandle;
 
@@ -25,6 +26,8 @@ pub struct DeformableState {
     pub(crate) impacts: Vec<Impact>,
     /// What hooks have noted of the pairs that it is in, with the partner, packed.
     pub(crate) pair_data: Vec<(Partner, u32)>,
+    /// What Maxwell branches have given way.
+    pub(crate) dampers: Dampers,
     /// Where the last step began, of bodies that go forward by two.
     pub(crate) history: History,
     pub(crate) sleep: Sleep,
@@ -119,11 +122,12 @@ impl DeformableState {
         self.x.iter().chain(&self.v).all(is_number)
     }
 
-    /// What of it a body of this many nodes cannot have; positions and velocities may be anything.
+    /// What of it a body of this model cannot have; positions and velocities may be anything.
     ///
     /// # Errors
     /// What is wrong.
-    pub(super) fn check(&self, nodes: usize) -> Result<(), &'static str> {
+    pub(super) fn check(&self, model: &DeformableModel) -> Result<(), &'static str> {
+        let nodes = model.rest.len();
         if self.x.len() != nodes || self.v.len() != nodes {
             return Err("its positions or velocities are not those of its mesh");
         }
@@ -151,6 +155,9 @@ impl DeformableState {
         let numbers = |i: &Impact| [i.approach, i.stored, i.most_stored, i.left];
         if !self.impacts.iter().flat_map(numbers).all(f64::is_finite) {
             return Err("an impact is not finite");
+        }
+        if !are_dampers(&self.dampers, model) {
+            return Err("its dampers are not those of its mesh");
         }
         self.factor_base.check(nodes)
     }

@@ -62,6 +62,16 @@ impl Membrane {
         response
     }
 
+    /// Density [J/m³] and stress \[Pa\] of the change from a stretch S, turned as the triangle is now: what damping and Maxwell
+    /// branches have, per factor on the stiffness.
+    pub fn change_response(&self, F: &Mat3x2, S: &Mat2) -> (f64, Mat3x2) {
+        let deviation = F - polar_factor(&(F * S)) * S;
+        let rotation = polar_factor(F);
+        let trace = rotation.dot(F) - S.trace();
+        let density = self.mu * deviation.norm_squared() + 0.5 * self.lambda * trace * trace;
+        (density, deviation * (2.0 * self.mu) + rotation * (self.lambda * trace))
+    }
+
     /// The Hessian over F: two modes that stretch, a shear and a turn in the plane, and two that tilt the
     /// triangle out of it.
     pub fn modes(&self, F: &Mat3x2) -> [MembraneMode; 6] {
@@ -175,6 +185,10 @@ mod tests {
                 let work = sheet.evaluate(&F).stress.dot(&dF);
                 // Central differences: 1e-10 · third derivative (to 1e2 at a stretch of 0.1).
                 prop_assert!(((ahead.density - behind.density) / (2.0 * eps) - work).abs() < 1e-6 * (1.0 + work.abs()));
+                let S = Mat2::new(1.1, 0.1, 0.1, 0.9);
+                let [above, below] = [eps, -eps].map(|t| sheet.change_response(&(F + dF * t), &S).0);
+                let work = sheet.change_response(&F, &S).1.dot(&dF);
+                prop_assert!(((above - below) / (2.0 * eps) - work).abs() < 1e-6 * (1.0 + work.abs()));
                 let slope = (ahead.stress - behind.stress) / (2.0 * eps);
                 let product = sheet.modes(&F).iter().fold(Mat3x2::zeros(), |sum, m| {
                     sum + m.shape * (m.stiffness * m.shape.dot(&dF))

@@ -70,9 +70,9 @@ pub(crate) fn add_forces(elements: &Elements<'_>, at: &Evaluation<'_>, force: &m
         }
     }
     if !(model.triangles.is_empty() && model.stencils.is_empty()) {
-        let StiffnessDamping { thin, ratios, .. } = at.damping;
+        let StiffnessDamping { stretches, ratios, .. } = at.damping;
         elastic.evaluated += model.triangles.len() + model.stencils.len();
-        elastic.energy += thin_elements::add_forces(elements, thin, ratios, at.x, force);
+        elastic.energy += thin_elements::add_forces(elements, stretches, ratios, at.x, force);
     }
     elastic
 }
@@ -103,7 +103,7 @@ fn sum_elements[E: ElementEnergy](
                 prefetch(next);
             }
             let mut response = energy.evaluate(F);
-            if let Some(stretch) = damping.stretches.get(first + k) {
+            if let Some(stretch) = damping.stretches.solid.get(first + k) {
                 let (density, stress) = damping_response(lame, stretch, F, &response.rotation);
                 response.density += density * ratio;
                 response.stress = response.stress.plus_scaled(&stress, Lane::splat(ratio));
@@ -135,14 +135,14 @@ fn add_smoothed_forces(
 ) {
     let [shape, volume] = material.lame().split();
     let domains = (&model.domains, region.domains.clone());
-    let damped = (shape, ratio, &at.damping.stretches[..]);
+    let damped = (shape, ratio, &at.damping.stretches.solid[..]);
     let of_shape = with_energy!(material, shape, energy => sum_domains(energy, domains, damped, at, force));
     elastic.add(&of_shape);
     if volume.lambda > 0.0 && of_shape.energy < f64::INFINITY {
         let bare = material.without_limits();
         let rest = Evaluation { limit: at.limit - of_shape.energy, ..*at };
         let domains = (&model.volume_domains, region.patches.clone());
-        let damped = (volume, ratio, &at.damping.patches[..]);
+        let damped = (volume, ratio, &at.damping.stretches.patches[..]);
         let of_volume =
             with_energy!(bare, volume, energy => sum_domains(energy, domains, damped, &rest, force));
         elastic.energy += of_volume.energy;

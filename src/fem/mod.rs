@@ -18,6 +18,7 @@ mod gradients;
 pub(crate) mod elastic_forces;
 mod stiffness_damping;
 mod stresses;
+mod stretches;
 mod thin_elements;
 
 mod frames;
@@ -29,6 +30,6 @@ pub use constant_matrix::SystemMatrix;
 pub(crate) use frames::{floating_frame, node_rotations, volume};
 pub use model::DeformableModel;
 pub(crate) use model::{Build, Elements};
-pub(crate) use stiffness_damping::StiffnessDamping;
+pub(crate) use stiffness_damping::{Dampers, StiffnessDamping, are_dampers, branch_strain, relaxed};
 pub(crate) use stresses::{ElementState, element_states, section_forces, sheet_stresses};
 pub(crate) use tangents::add_tangents;

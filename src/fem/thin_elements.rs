@@ -1,49 +1,13 @@
 //! Sheets, rods, springs and fibres: their elements, made of a structure, and their energy and forces.
 
-use super::elements::{Stencil, TriangleElement};
+use super::elements::Stencil;
 use super::model::Elements;
 use super::regions::Region;
-use crate::energy::membrane::{Membrane, polar_factor};
+use super::stretches::Stretches;
+use crate::energy::membrane::Membrane;
 use crate::energy::stencil::{LengthEnergy, StencilKind};
 use crate::material::DeformableMaterial;
-use crate::math::{Mat2, Vec3};
-
-/// Stiffness damping of thin elements over one step: how they were stretched at its start.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct ThinDamping {
-    stretches: Vec<Mat2>,
-    lengths: Vec<f64>,
-}
-
-impl ThinDamping {
-    /// At `x`, or what that and `before` amount to in a step of the second order.
-    pub fn begin(
-        &mut self,
-        triangles: &[TriangleElement],
-        stencils: &[Stencil],
-        is_damped: bool,
-        x: &[Vec3],
-        before: Option<&[Vec3]>,
-    ) {
-        self.stretches.clear();
-        self.lengths.clear();
-        if is_damped {
-            let stretch = |t: &TriangleElement, x: &[Vec3]| {
-                let F = t.deformation_gradient(x);
-                let S = polar_factor(&F).tr_mul(&F);
-                (S + S.transpose()) * 0.5
-            };
-            self.stretches.extend(triangles.iter().map(|t| {
-                let now = stretch(t, x);
-                before.map_or(now, |before| now + (now - stretch(t, before)) / 3.0)
-            }));
-            self.lengths.extend(stencils.iter().map(|s| {
-                let now = s.vector(x).norm();
-                before.map_or(now, |before| now + (now - s.vector(before).norm()) / 3.0)
-            }));
-        }
-    }
-}
+use crate::math::Vec3;
 
 /// The energy of a material's sheets.
 pub(super) fn membrane(material: &DeformableMaterial) -> Membrane {
@@ -90,7 +54,7 @@ pub(super) fn length_energy(
 /// Adds the forces \[N\] of a body's thin elements at positions `x`; returns their energy \[J\]. `ratios` are β/h of the regions.
 pub(super) fn add_forces(
     elements: &Elements<'_>,
-    damping: &ThinDamping,
+    damping: &Stretches,
     ratios: &[f64],
     x: &[Vec3],
     force: &mut [Vec3],
@@ -125,22 +89,22 @@ fn add_triangles(
     region: &Region,
     elements: &Elements<'_>,
     material: &DeformableMaterial,
-    (damping, ratio): (&ThinDamping, f64),
+    (damping, ratio): (&Stretches, f64),
     x: &[Vec3],
     force: &mut [Vec3],
 ) -> f64 {
-    let (sheet, lame) = (membrane(material), material.lame());
+    let sheet = membrane(material);
     let mut energy = 0.0;
     for k in region.triangles.clone() {
         let triangle = &elements.model.triangles[k];
         let F = triangle.deformation_gradient(x);
         let response = sheet.evaluate(&F);
         let (mut density, mut stress) = (response.density, response.stress);
-        if let Some(S) = damping.stretches.get(k) {
+        if let Some(S) = damping.sheets.get(k) {
             // As of tetrahedra: towards the last stretch, turned as the triangle is now.
-            let deviation = F - polar_factor(&(F * S)) * S;
-            density += ratio * lame.mu * deviation.norm_squared();
-            stress += deviation * (2.0 * ratio * lame.mu);
+            let (extra, pull) = sheet.change_response(&F, S);
+            density += ratio * extra;
+            stress += pull * ratio;
         }
         energy += triangle.volume * density;
         for (&n, g) in triangle.nodes.iter().zip(&triangle.gradients) {

@@ -2,6 +2,10 @@
 
 mod damping;
 mod presets;
+mod relaxation;
+
+pub(crate) use relaxation::MAX_BRANCHES;
+pub use relaxation::MaxwellBranch;
 
 use crate::energy::strain_limit::STIFFENING;
 use crate::energy::{Elasticity, Lame};
@@ -50,6 +54,8 @@ pub struct DeformableMaterial {
     /// Stiffness-proportional damping β \[s\]: stress `β` times the co-rotated strain rate times the
     /// stiffness. Rotation is not damped.
     pub stiffness_damping: f64,
+    /// Springs that give way with time, beside the elastic part; those of ratio nought are none.
+    pub maxwell_branches: [MaxwellBranch; MAX_BRANCHES],
     /// The elastic energy of tetrahedra. Triangles of cloth, rods and springs have their own.
     pub elasticity: Elasticity,
     /// Least and largest principal stretch [–]: beyond, twenty times Young's modulus comes on top.
@@ -71,6 +77,7 @@ impl DeformableMaterial {
             restitution: 0.0,
             mass_damping: 0.0,
             stiffness_damping: 0.0,
+            maxwell_branches: Default::default(),
             elasticity: Elasticity::default(),
             strain_limits: None,
             fibre_modulus: 0.0,
@@ -172,6 +179,11 @@ impl DeformableMaterial {
         not_negative("mass damping", self.mass_damping)?;
         not_negative("stiffness damping", self.stiffness_damping)?;
         not_negative("fibre modulus", self.fibre_modulus)?;
+        for MaxwellBranch { ratio, time } in self.maxwell_branches {
+            not_negative("ratio of a Maxwell branch", ratio)?;
+            let fine = ratio == 0.0 || time.is_finite() && time > 0.0;
+            check("time of a Maxwell branch", time, "positive and finite", fine)?;
+        }
         if let Some([least, largest]) = self.strain_limits {
             check("least stretch", least, "in [0, 1)", (0.0..1.0).contains(&least))?;
             check("largest stretch", largest, "above 1 and finite", largest.is_finite() && largest > 1.0)?;
@@ -215,6 +227,8 @@ mod tests {
             (good.mass_damping(f64::INFINITY), "mass damping"),
             (good.stiffness_damping(-1e-9), "stiffness damping"),
             (good.fibre_modulus(-1.0), "fibre modulus"),
+            (good.maxwell_branches([(-0.1, 1.0)]), "ratio of a Maxwell branch"),
+            (good.maxwell_branches([(0.1, 1.0), (0.1, 0.0)]), "time of a Maxwell branch"),
             (good.strain_limits(1.0, 1.1), "least stretch"),
             (good.strain_limits(0.9, f64::NAN), "largest stretch"),
         ] {

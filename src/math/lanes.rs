@@ -11,7 +11,8 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 pub(crate) const LANES: usize = 4;
 
 /// One number per element of a block.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 #[repr(align(32))]
 pub(crate) struct Lane(pub [f64; LANES]);
 
@@ -100,7 +101,8 @@ pub(crate) fn dot3(a: [Lane; 3], b: [Lane; 3]) -> Lane {
 }
 
 /// One 3×3 matrix per element of a block, `self.0[3 * column + row]`.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct LaneMat3(pub [Lane; 9]);
 
 impl LaneMat3 {

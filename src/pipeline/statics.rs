@@ -3,6 +3,8 @@
 
 use super::world::DeformableWorld;
 use crate::body::{DeformableBody, DeformableState, Integrator, SolverSettings};
+use crate::fem::relaxed;
+use crate::material::DeformableMaterial;
 use crate::math::Vec3;
 use rapier3d::dynamics::{RigidBodyHandle, RigidBodyType};
 use rapier3d::math::Vector;
@@ -125,7 +127,9 @@ fn begin(body: &mut DeformableBody, tolerance: f64) -> Kept {
     let settings = kept.settings.max_iterations(ITERATIONS).tolerance(SHARPER * tolerance);
     body.set_settings(settings.integrator(Integrator::ImplicitEuler).contact_tolerance(SHARPER * tolerance));
     body.set_can_sleep(false);
-    body.materials.iter_mut().for_each(|material| material.mass_damping = 0.0);
+    // Rest is what is left in the end: branches have given way.
+    let at_last = |m: &DeformableMaterial| m.mass_damping(0.0).maxwell_branches([]);
+    body.materials.iter_mut().for_each(|material| *material = at_last(material));
     kept
 }
 
@@ -133,6 +137,7 @@ fn end(body: &mut DeformableBody, kept: Kept) {
     body.set_settings(kept.settings);
     body.set_can_sleep(kept.can_sleep);
     body.distribute_materials();
+    body.state.dampers = relaxed(&body.elements(), &body.state.x);
     body.pins.iter_mut().zip(kept.led).for_each(|(pin, velocity)| pin.velocity = velocity);
 }
 

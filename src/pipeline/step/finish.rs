@@ -24,6 +24,7 @@ impl StepScratch {
                 let handle = self.works[index].handle;
                 let Some(body) = deformables.get_mut(handle) else { continue };
                 if finite {
+                    work.island.bodies[local].give_way(&mut body.state.dampers);
                     store(body, work, local, h, &mut self.counters);
                     let problem = &work.island.bodies[local];
                     body.report.is_rejected = problem.is_rejected;

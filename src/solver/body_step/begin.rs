@@ -116,6 +116,7 @@ impl BodyProblem {
         self.step.resize(n, Vec3::zeros());
         let before = (self.scheme == Scheme::Bdf2).then_some(&body.state.history.x[..]);
         let elements = body.elements();
+        self.damping.take_dampers(&elements, &body.state.dampers);
         self.damping.begin(&elements, self.damping_step(), &body.state.x, before);
         let mass = self.masses.iter().sum::<f64>();
         self.weight = mass * (gravity * body.gravity_scale()).norm() / n as f64;

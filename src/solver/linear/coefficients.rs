@@ -11,11 +11,6 @@ pub(crate) fn dimension(system: SystemMatrix) -> usize {
     }
 }
 
-/// Factor of stiffness damping on the elastic part of the matrix, 1 + β/h.
-pub(crate) fn stiffening(material: &DeformableMaterial, h: f64) -> f64 {
-    1.0 + material.stiffness_damping / h
-}
-
 /// Inertia of the nodes in the matrix, (1 + αh) m/h² [N/m].
 pub(crate) fn node_inertia(model: &DeformableModel, materials: &[DeformableMaterial], h: f64) -> Vec<f64> {
     let alpha = model.mass_damping(materials);

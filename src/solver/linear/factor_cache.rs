@@ -6,7 +6,7 @@
 use super::affine_modes::CoarseInverse;
 use super::changed_pins::ChangedPins;
 use super::clusters::Clusters;
-use super::coefficients::{dimension, stiffening};
+use super::coefficients::dimension;
 use super::compliance_columns::ComplianceColumns;
 use super::factor::{BATCH, FactorScratch, Symbolic};
 use super::factor_values::Factor;
@@ -238,7 +238,7 @@ impl FactorCache {
         };
         let columns = ComplianceColumns::new(&body.model.surface, key.system);
         let clusters = (key.clusters > 0).then(|| {
-            let weight = |m: &DeformableMaterial| laplacian_weight(m) * stiffening(m, key.h());
+            let weight = |m: &DeformableMaterial| laplacian_weight(m) * m.stiffening(key.h());
             let weights: Vec<f64> = body.materials.iter().map(weight).collect();
             let (pins, scratch) = (&key.pins, &mut self.scratch);
             Clusters::new(&body.model, key.clusters, &weights, pins, &symbolic, &factor, scratch)

@@ -88,7 +88,7 @@ struct ShiftedInverse {
 
 impl ShiftedInverse {
     fn new(body: &DeformableBody, shift: f64) -> Result<Self, BodyError> {
-        let bare = |m: &DeformableMaterial| m.stiffness_damping(0.0).mass_damping(0.0);
+        let bare = |m: &DeformableMaterial| m.stiffness_damping(0.0).mass_damping(0.0).maxwell_branches([]);
         let materials: Vec<DeformableMaterial> = body.materials.iter().map(bare).collect();
         let elements = Elements { materials: &materials, ..body.elements() };
         let pins: Vec<u32> = body.pins.iter().map(|pin| pin.node).collect();

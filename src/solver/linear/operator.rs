@@ -1,7 +1,7 @@
 //! The constant matrix as what it does, element by element, without being put together: for conjugate gradients
 //! on bodies whose factor would not fit, or would be made anew all the time.
 
-use super::coefficients::{dimension, node_inertia, stiffening};
+use super::coefficients::{dimension, node_inertia};
 use super::gauss_seidel::OVER_DIAGONAL;
 use crate::fem::constant_matrix::{add_blocks, subtract_product};
 use crate::fem::{DeformableModel, Elements, SystemMatrix};
@@ -62,7 +62,7 @@ impl StiffnessOperator {
         add_blocks(
             &operator.elements(),
             system,
-            |material| stiffening(material, h),
+            |material| material.stiffening(h),
             |i, j, block| {
                 if i == j {
                     diagonal[i] += block;
@@ -98,7 +98,7 @@ impl StiffnessOperator {
     fn multiply(&self, v: &[Vec3], out: &mut Vec<Vec3>) {
         out.clear();
         out.resize(v.len(), Vec3::zeros());
-        let stiffening = |material: &DeformableMaterial| stiffening(material, self.h);
+        let stiffening = |material: &DeformableMaterial| material.stiffening(self.h);
         subtract_product(&self.elements(), self.system, stiffening, v, out);
         self.pins.iter().for_each(|&p| out[p as usize] = Vec3::zeros());
         for ((out, v), m) in out.iter_mut().zip(v).zip(&self.inertia) {

@@ -6,13 +6,13 @@
 //! A pinned node has the identity for its row and column, so every set of pins shares one symbolic
 //! factor.
 
-use super::coefficients::{dimension, node_inertia, stiffening};
+use super::coefficients::{dimension, node_inertia};
 use super::factor::Symbolic;
 use crate::body::{DeformableBody, FactorPrecision, Solver};
 use crate::energy::Elasticity;
 use crate::fem::constant_matrix::add_blocks;
 use crate::fem::{DeformableModel, Elements, SystemMatrix, add_tangents};
-use crate::material::DeformableMaterial;
+use crate::material::{DeformableMaterial, MAX_BRANCHES};
 use crate::math::{Mat3, Vec3};
 
 /// Everything a numeric factor depends on: it is valid for any body that agrees in all of it.
@@ -38,13 +38,16 @@ struct MaterialKey {
     elasticity: Elasticity,
     /// Bits of E, ν, ρ, α, β, and the modulus of fibres.
     bits: [u64; 6],
+    /// Bits of ratios and times.
+    branches: [[u64; 2]; MAX_BRANCHES],
 }
 
 impl MaterialKey {
     fn new(m: &DeformableMaterial) -> Self {
         let [e, nu, rho] = [m.youngs_modulus, m.poisson_ratio, m.density];
         let bits = [e, nu, rho, m.mass_damping, m.stiffness_damping, m.fibre_modulus].map(f64::to_bits);
-        Self { elasticity: m.elasticity, bits }
+        let branches = m.maxwell_branches.map(|branch| [branch.ratio, branch.time].map(f64::to_bits));
+        Self { elasticity: m.elasticity, bits, branches }
     }
 }
 
@@ -133,7 +136,7 @@ pub(crate) fn assemble(
 ) -> Vec<f64> {
     let mut matrix = Upper::new(model, materials, pins, system, h, symbolic);
     let elements = Elements { model, materials, activation: 1.0 };
-    let stiffening = |material: &DeformableMaterial| stiffening(material, h);
+    let stiffening = |material: &DeformableMaterial| material.stiffening(h);
     add_blocks(&elements, system, stiffening, |i, j, block| matrix.add_elastic(i, j, block));
     matrix.values
 }
@@ -150,7 +153,7 @@ pub(crate) fn assemble_tangent(
 ) -> Vec<f64> {
     let Elements { model, materials, .. } = elements;
     let mut matrix = Upper::new(model, materials, pins, SystemMatrix::RestStiffness, h, symbolic);
-    let stiffening = |material: &DeformableMaterial| stiffening(material, h);
+    let stiffening = |material: &DeformableMaterial| material.stiffening(h);
     add_tangents(elements, x, projected, stiffening, |i, j, block| matrix.add_elastic(i, j, block));
     matrix.values
 }
