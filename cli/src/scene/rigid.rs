@@ -2,16 +2,21 @@
 
 use super::Vec3;
 use rapier3d::prelude::JointAxis;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rigid {
+    #[schemars(with = "String")]
     pub name: Spanned<String>,
     pub kind: Kind,
+    #[schemars(with = "Shape")]
     pub shape: Spanned<Shape>,
+    #[schemars(with = "Option<f32>")]
     pub mass: Option<Spanned<f32>>,
+    #[schemars(with = "Option<f32>")]
     pub density: Option<Spanned<f32>>,
     #[serde(default)]
     pub translation: Vec3,
@@ -41,7 +46,7 @@ fn friction() -> f32 {
     0.5
 }
 
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     Fixed,
@@ -49,21 +54,56 @@ pub enum Kind {
     Kinematic,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape {
-    Ball { radius: f32 },
-    Cuboid { half_extents: Vec3 },
-    Capsule { half_height: f32, radius: f32 },
-    Cylinder { half_height: f32, radius: f32 },
-    Cone { half_height: f32, radius: f32 },
-    HalfSpace { normal: Vec3 },
+    Ball {
+        radius: f32,
+    },
+    Cuboid {
+        half_extents: Vec3,
+    },
+    Capsule {
+        half_height: f32,
+        radius: f32,
+    },
+    Cylinder {
+        half_height: f32,
+        radius: f32,
+    },
+    Cone {
+        half_height: f32,
+        radius: f32,
+    },
+    HalfSpace {
+        normal: Vec3,
+    },
+    /// Triangles of an OBJ, STL, PLY or glTF file, relative to the scene file.
+    Mesh {
+        path: String,
+        /// Metres per unit of the file.
+        #[serde(default = "one")]
+        scale: f32,
+        /// Whether z is up in the file.
+        #[serde(default)]
+        z_up: bool,
+    },
+    /// Heights on a grid over x and z, rows along x.
+    Heightfield {
+        heights: Vec<Vec<f32>>,
+        size: [f32; 2],
+    },
+}
+
+pub(super) fn one() -> f32 {
+    1.0
 }
 
 /// Two rigid bodies held together.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Joint {
+    #[schemars(with = "[String; 2]")]
     pub between: [Spanned<String>; 2],
     pub kind: JointKind,
     /// Where in the world it is at the start.
@@ -75,7 +115,7 @@ pub struct Joint {
 }
 
 /// The axis is that of both bodies' frames.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum JointKind {
     Fixed {},
@@ -94,7 +134,7 @@ impl JointKind {
 }
 
 /// Drives the free axis of a joint with no more than `max_force` [N, N m].
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Motor {
     pub velocity: f32,
@@ -106,9 +146,10 @@ pub struct Motor {
 }
 
 /// A motor's velocity from a time on.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Switch {
+    #[schemars(with = "f32")]
     pub at: Spanned<f32>,
     pub velocity: f32,
 }

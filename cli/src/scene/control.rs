@@ -1,24 +1,29 @@
 //! What holds bodies and what moves them.
 
 use super::{Region, Vec3};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
 /// Surface vertices of a deformable in a box of the world, held by a rigid body where they are at the start.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Attach {
+    #[schemars(with = "String")]
     pub deformable: Spanned<String>,
+    #[schemars(with = "String")]
     pub to: Spanned<String>,
     pub region: Region,
 }
 
 /// How a kinematic body moves beside its velocities: smoothly by a vector, or to and fro by it.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Move {
+    #[schemars(with = "String")]
     pub of: Spanned<String>,
     /// Begin and end [s].
+    #[schemars(with = "[f32; 2]")]
     pub during: Spanned<[f32; 2]>,
     pub by: Vec3,
     /// Periods to and fro; comes back to where it was then.

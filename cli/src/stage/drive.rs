@@ -1,13 +1,15 @@
 //! What a scene does to its bodies while it runs: kinematic bodies that move, motors that turn round.
 
-use super::build::Stage;
-use super::file::Scene;
+use super::Stage;
+use crate::scene::Scene;
 use rapier3d::prelude::*;
 
 /// A joint with a motor.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub enum Motored {
+    /// By impulses.
     Joint(ImpulseJointHandle),
+    /// In a multibody.
     Link(MultibodyJointHandle),
 }
 

@@ -1,14 +1,18 @@
 //! Deformable bodies: what they are made of, and how they are solved.
 
 use super::{Shape, Vec3};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Deformable {
+    #[schemars(with = "String")]
     pub name: Spanned<String>,
+    #[schemars(with = "Body")]
     pub body: Spanned<Body>,
+    #[schemars(with = "Material")]
     pub material: Spanned<Material>,
     #[serde(default)]
     pub translation: Vec3,
@@ -27,7 +31,7 @@ pub struct Deformable {
     pub solver: Solver,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Body {
     Lattice {
@@ -38,9 +42,18 @@ pub enum Body {
         shape: Shape,
         cell_size: f32,
     },
-    /// A Gmsh file, relative to the scene file.
+    /// A file, relative to the scene file: tetrahedra from Gmsh, TetGen, MEDIT and VTK files, or a closed surface from OBJ, STL, PLY
+    /// and glTF ones, which is repaired and filled.
     Mesh {
         path: String,
+        /// Size of the tetrahedra \[m\] that a surface is filled with; a twelfth of its size if not given.
+        cell_size: Option<f32>,
+        /// Metres per unit of the file.
+        #[serde(default = "super::rigid::one")]
+        scale: f32,
+        /// Whether z is up in a surface's file.
+        #[serde(default)]
+        z_up: bool,
     },
     /// A rectangle of triangles in the plane of x and z.
     Cloth {
@@ -61,7 +74,7 @@ pub enum Body {
     },
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
     pub youngs_modulus: f64,
@@ -80,6 +93,9 @@ pub struct Material {
     pub elasticity: Elasticity,
     /// Least and largest stretch.
     pub strain_limits: Option<[f64; 2]>,
+    /// Up to four terms of a Prony series, each `[ratio, time]`: stiffness over the lasting one, and seconds.
+    #[serde(default)]
+    pub maxwell_branches: Vec<[f64; 2]>,
 }
 
 fn density() -> f64 {
@@ -90,7 +106,7 @@ fn soft_friction() -> f64 {
     0.5
 }
 
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Elasticity {
     #[default]
@@ -114,6 +130,12 @@ impl Material {
                 Elasticity::FixedCorotated => foible3d::Elasticity::FixedCorotated,
                 Elasticity::NeoHookean => foible3d::Elasticity::NeoHookean,
             });
+        let branch =
+            |k: usize| self.maxwell_branches.get(k).map_or((0.0, 0.0), |[ratio, time]| (*ratio, *time));
+        let material = match self.maxwell_branches.is_empty() {
+            true => material,
+            false => material.maxwell_branches([branch(0), branch(1), branch(2), branch(3)]),
+        };
         match self.strain_limits {
             Some([least, largest]) => material.strain_limits(least, largest),
             None => material,
@@ -121,14 +143,14 @@ impl Material {
     }
 }
 
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
     pub min: Vec3,
     pub max: Vec3,
 }
 
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "a box `{ min, max }` or a list of such")]
 pub enum Regions {
     One(Region),
@@ -144,7 +166,7 @@ impl Regions {
     }
 }
 
-#[derive(Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Solver {
     /// A preset that the other keys change.
@@ -159,7 +181,7 @@ pub struct Solver {
     pub lbfgs: Option<usize>,
 }
 
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fidelity {
     Preview,
@@ -168,7 +190,7 @@ pub enum Fidelity {
     Reference,
 }
 
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverKind {
     Projective,
@@ -178,14 +200,14 @@ pub enum SolverKind {
     Newton,
 }
 
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum System {
     RestStiffness,
     Laplacian,
 }
 
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Frames {
     Automatic,

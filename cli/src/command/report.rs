@@ -1,0 +1,63 @@
+//! `foible report`.
+
+use super::{FAILED, Format, MET};
+use crate::report::{of_run, of_sweep, to_xml};
+use crate::sweep::{Done, Table, read};
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example: foible report target/scenes/drop --junit drop.xml")]
+pub(super) struct Report {
+    /// A folder with the results of a run, or of all cases of a sweep.
+    results: PathBuf,
+    /// How results are printed.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+    /// Also writes JUnit's XML.
+    #[arg(long)]
+    junit: Option<PathBuf>,
+}
+
+impl Report {
+    pub fn main(&self) -> Result<u8, String> {
+        let done = self.results()?;
+        let is_sweep = done.iter().any(|d| d.folder != self.results);
+        let table = Table::of(&done);
+        if is_sweep {
+            let name = done.first().map_or(String::new(), |d| d.outcome.scene.clone());
+            super::sweep::write_table(&name, &table, &done, &self.results)?;
+        } else {
+            done.iter().try_for_each(|done| super::run::write_page(done, &[]))?;
+        }
+        if let Some(path) = &self.junit {
+            let runs: Vec<_> = done.iter().map(|d| (&d.outcome, &d.costs, &[][..])).collect();
+            std::fs::write(path, to_xml(&runs)?).map_err(|e| format!("{}: {e}", path.display()))?;
+        }
+        match self.format {
+            Format::Json => println!("{}", super::run::json(&done)?),
+            Format::Text if is_sweep => print!("{}", of_sweep(&table)),
+            Format::Text => done.iter().for_each(|d| print!("{}", of_run(&d.outcome, &d.costs))),
+        }
+        Ok(if done.iter().any(|d| d.outcome.failures() > 0) { FAILED } else { MET })
+    }
+
+    /// The results in the folder, or in the folders in it, in order.
+    fn results(&self) -> Result<Vec<Done>, String> {
+        let done = |folder: &Path| {
+            let (outcome, costs) = read(folder)?;
+            Ok(Done { outcome, costs, folder: folder.to_path_buf(), is_old: true })
+        };
+        if self.results.join("outcome.json").exists() {
+            return Ok(vec![done(&self.results)?]);
+        }
+        let entries =
+            std::fs::read_dir(&self.results).map_err(|e| format!("{}: {e}", self.results.display()))?;
+        let mut folders: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+        folders.retain(|folder| folder.join("outcome.json").exists());
+        folders.sort();
+        if folders.is_empty() {
+            return Err(format!("{}: there are no results", self.results.display()));
+        }
+        folders.iter().map(|folder| done(folder)).collect()
+    }
+}

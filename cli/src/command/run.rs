@@ -1,0 +1,148 @@
+//! `foible run`.
+
+use super::progress::bar;
+use super::{FAILED, Format, MET, STOPPED, is_stopped, name_of, parse_set, scene_files, stop_flag};
+use crate::baseline::{self, Baseline, Drift};
+use crate::report::{PageOfRun, lines, of_drifts, of_run, page_of_run, to_xml};
+use crate::run::Trace;
+use crate::scene::SceneFile;
+use crate::sweep::{Case, Done, Job, JobOptions, run_jobs};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example: foible run drop.toml --set height=0.8 --out results")]
+pub(super) struct Run {
+    /// Scene files, or folders of them; `examples/scenes` if none.
+    scenes: Vec<PathBuf>,
+    /// Where results go: NAME/outcome.json, trace.csv, plot.svg and index.html.
+    #[arg(long, default_value = "target/scenes")]
+    out: PathBuf,
+    /// Scenes side by side.
+    #[arg(long, default_value_t = 1)]
+    jobs: usize,
+    /// Only scenes whose name has this in it.
+    #[arg(long)]
+    only: Option<String>,
+    /// A parameter or a dotted path, NAME=VALUE; may be given more than once.
+    #[arg(long, value_parser = parse_set)]
+    set: Vec<(String, String)>,
+    /// How results are printed.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+    /// Also writes JUnit's XML.
+    #[arg(long)]
+    junit: Option<PathBuf>,
+    /// Pictures per second of the replay; 0 for none.
+    #[arg(long, default_value_t = 60.0)]
+    replay_rate: f64,
+    /// Takes no notice of baselines.
+    #[arg(long)]
+    no_baseline: bool,
+}
+
+impl Run {
+    pub fn main(&self) -> Result<u8, String> {
+        let files = scene_files(&self.scenes, self.only.as_deref())?;
+        let jobs = jobs(&files, &self.set, &self.out)?;
+        let done = self.run(&jobs)?;
+        let mut drifts = Vec::new();
+        for (done, file) in done.iter().zip(&files) {
+            drifts.push(self.drifts(file, done)?);
+        }
+        for (done, drifts) in done.iter().zip(&drifts) {
+            write_page(done, drifts)?;
+        }
+        if let Some(path) = &self.junit {
+            let runs: Vec<_> =
+                done.iter().zip(&drifts).map(|(d, drifts)| (&d.outcome, &d.costs, &drifts[..])).collect();
+            std::fs::write(path, to_xml(&runs)?).map_err(|e| format!("{}: {e}", path.display()))?;
+        }
+        let failures: usize = done.iter().map(|d| d.outcome.failures()).sum::<usize>()
+            + drifts.iter().map(Vec::len).sum::<usize>();
+        match self.format {
+            Format::Json => println!("{}", json(&done)?),
+            Format::Text => {
+                for (done, drifts) in done.iter().zip(&drifts) {
+                    print!("{}{}", of_run(&done.outcome, &done.costs), of_drifts(drifts));
+                    println!("  results and a page to look at: {}", done.folder.join("index.html").display());
+                }
+                println!("\n{} scenes, {failures} failures", done.len());
+            }
+        }
+        Ok(if is_stopped() {
+            STOPPED
+        } else if failures > 0 {
+            FAILED
+        } else {
+            MET
+        })
+    }
+
+    fn run(&self, jobs: &[Job]) -> Result<Vec<Done>, String> {
+        let steps = jobs.iter().map(|job| job.file.scene.steps().0).sum();
+        let bar = bar(steps, "steps");
+        let before = Mutex::new(vec![0u64; jobs.len()]);
+        let progress = |job: usize, step: u64| {
+            let mut before = before.lock().unwrap_or_else(|e| e.into_inner());
+            bar.inc(step - before[job]);
+            before[job] = step;
+        };
+        let options = JobOptions {
+            jobs: self.jobs,
+            replay_rate: self.replay_rate.max(0.0),
+            stop: Some(stop_flag()),
+            progress: Some(&progress),
+            ..JobOptions::default()
+        };
+        let done = run_jobs(jobs, &options);
+        bar.finish_and_clear();
+        done
+    }
+
+    fn drifts(&self, scene: &Path, done: &Done) -> Result<Vec<Drift>, String> {
+        // What is set is not what was blessed.
+        if self.no_baseline || !self.set.is_empty() {
+            return Ok(Vec::new());
+        }
+        let baseline = Baseline::read(&baseline::path_of(scene))?;
+        Ok(baseline.map_or(Vec::new(), |baseline| baseline.drifts(&done.outcome)))
+    }
+}
+
+/// The jobs of scenes, each into a folder of its name. All files are read before the first is run.
+pub(super) fn jobs(files: &[PathBuf], set: &[(String, String)], out: &Path) -> Result<Vec<Job>, String> {
+    let job = |path: &PathBuf| {
+        let file = SceneFile::read(path, set).map_err(|e| format!("{}: {e}", path.display()))?;
+        let case = Case { name: String::new(), set: set.to_vec() };
+        Ok(Job { file, case, folder: out.join(name_of(path)) })
+    };
+    files.iter().map(job).collect()
+}
+
+/// The page and the plot of a run, from what is in its folder.
+pub(super) fn write_page(done: &Done, drifts: &[Drift]) -> Result<(), String> {
+    let folder = &done.folder;
+    let said = |e: &dyn std::fmt::Display| format!("{}: {e}", folder.display());
+    let trace = if folder.join("trace.csv").exists() {
+        Trace::read_csv(&folder.join("trace.csv"))?
+    } else {
+        Trace::default()
+    };
+    let replay = std::fs::read(folder.join("replay.bin")).ok();
+    let run = PageOfRun {
+        outcome: &done.outcome,
+        costs: &done.costs,
+        trace: &trace,
+        drifts,
+        replay: replay.as_deref(),
+    };
+    std::fs::write(folder.join("index.html"), page_of_run(&run)).map_err(|e| said(&e))?;
+    let plot = lines(&trace.heights(), "height [m]")?;
+    std::fs::write(folder.join("plot.svg"), plot).map_err(|e| said(&e))
+}
+
+pub(super) fn json(done: &[Done]) -> Result<String, String> {
+    let one = |done: &Done| serde_json::json!({ "outcome": done.outcome, "costs": done.costs, "folder": done.folder });
+    serde_json::to_string_pretty(&done.iter().map(one).collect::<Vec<_>>()).map_err(|e| e.to_string())
+}

@@ -1,0 +1,97 @@
+//! Reports for people at a terminal.
+
+use crate::baseline::Drift;
+use crate::run::{Costs, Outcome, Verdict};
+use crate::sweep::{Summary, Table};
+use std::fmt::Write as _;
+
+/// A number with its unit, as people write it.
+pub(crate) fn number(value: f64, unit: &str) -> String {
+    let size = value.abs();
+    let text = match size {
+        _ if value.is_nan() => return "NaN".into(),
+        _ if size == 0.0 => "0".into(),
+        _ if (1e-3..1e6).contains(&size) => {
+            let places = (5 - size.log10().floor() as i32).clamp(0, 9) as usize;
+            let text = format!("{value:.places$}");
+            if text.contains('.') {
+                text.trim_end_matches('0').trim_end_matches('.').to_string()
+            } else {
+                text
+            }
+        }
+        _ => format!("{value:.3e}"),
+    };
+    if unit.is_empty() { text } else { format!("{text} {unit}") }
+}
+
+fn verdict(text: &mut String, verdict: &Verdict) {
+    let word = if verdict.met { "ok    " } else { "FAILED" };
+    let value = number(verdict.measured.value, &verdict.measured.unit);
+    let _ = writeln!(text, "  {word} {}: {value} ({})", verdict.measured.name, verdict.wanted);
+}
+
+/// Numbers, verdicts and costs of one run.
+pub fn of_run(outcome: &Outcome, costs: &Costs) -> String {
+    let mut text = format!("\n{}: {} steps of {:.3} ms\n", outcome.title(), outcome.steps, outcome.dt * 1e3);
+    if let Some(error) = &outcome.error {
+        let _ = writeln!(text, "  FAILED {error}");
+    }
+    outcome.verdicts.iter().for_each(|own| verdict(&mut text, own));
+    for measured in &outcome.measures {
+        let _ = writeln!(text, "         {}: {}", measured.name, number(measured.value, &measured.unit));
+    }
+    let Costs { mean, median, p99, worst, .. } = costs;
+    let _ = writeln!(
+        text,
+        "  per step: mean {mean:.3}, median {median:.3}, 99th percentile {p99:.3}, worst {worst:.3} ms"
+    );
+    text
+}
+
+/// What is not as it was.
+pub fn of_drifts(drifts: &[Drift]) -> String {
+    let mut text = String::new();
+    for drift in drifts {
+        let was = drift
+            .blessed
+            .map_or("not there".into(), |b| format!("{} within {:e}", number(b.value, ""), b.within));
+        let is = drift.found.map_or("is gone".into(), |value| format!("is {}", number(value, "")));
+        let _ = writeln!(text, "  DRIFT  {} was {was}, {is}", drift.name);
+    }
+    text
+}
+
+/// A sweep: every number over its cases, and the worst ones by name.
+pub fn of_sweep(table: &Table) -> String {
+    let summaries = table.summaries();
+    let longest = summaries.iter().map(|s| s.name.chars().count()).max().unwrap_or(0).min(60);
+    let mut text = format!(
+        "\n  {:<longest$} {:>12} {:>12}  least and largest, with their cases\n",
+        "over all cases", "mean", "deviation"
+    );
+    for Summary { name, mean, deviation, least, largest } in &summaries {
+        let at = |(value, case): &(f64, String)| format!("{} [{case}]", number(*value, ""));
+        let (mean, deviation) = (number(*mean, ""), number(*deviation, ""));
+        let _ =
+            writeln!(text, "  {name:<longest$} {mean:>12} {deviation:>12}  {} … {}", at(least), at(largest));
+    }
+    for row in table.rows.iter().filter(|row| row.failures > 0) {
+        let _ = writeln!(text, "  FAILED [{}]: {} expectations", row.case, row.failures);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn numbers_have_six_digits_and_no_zeros_behind_them() {
+        assert_eq!(number(1608.84, "N"), "1608.84 N");
+        assert_eq!(number(0.1, "m"), "0.1 m");
+        assert_eq!(number(2.5e-7, "m"), "2.500e-7 m");
+        assert_eq!(number(123456.7, ""), "123457");
+        assert_eq!(number(f64::NAN, "m"), "NaN");
+    }
+}

@@ -1,0 +1,133 @@
+//! Soft bodies of a scene.
+
+use super::pose;
+use super::shapes::{simple_shape, surface};
+use crate::scene::{self, Body};
+use foible3d::prelude::*;
+use rapier3d::prelude::*;
+use std::path::Path;
+
+/// Cells across the largest side of a surface that is filled, where no size is given.
+const CELLS_ACROSS: f32 = 12.0;
+
+/// A polyline cut into segments of equal length.
+fn polyline(points: &[[f32; 3]], segments: usize) -> Vec<Vector> {
+    let points: Vec<Vector> = points.iter().map(|&p| p.into()).collect();
+    let lengths: Vec<f32> = points.windows(2).map(|p| (p[1] - p[0]).length()).collect();
+    let total: f32 = lengths.iter().sum();
+    let at = |mut along: f32| {
+        for (ends, length) in points.windows(2).zip(&lengths) {
+            if along <= *length {
+                return ends[0] + (ends[1] - ends[0]) * (along / length);
+            }
+            along -= length;
+        }
+        points.last().copied().unwrap_or_default()
+    };
+    (0..=segments).map(|k| at(total * k as f32 / segments.max(1) as f32)).collect()
+}
+
+/// The shape of a deformable.
+fn mesh(body: &Body, folder: &Path) -> Result<DeformableBodyBuilder, String> {
+    Ok(match body {
+        Body::Lattice { half_extents, cells } => {
+            DeformableBodyBuilder::cuboid((*half_extents).into(), *cells)
+        }
+        Body::Filled { shape, cell_size } => DeformableBodyBuilder::filled(
+            &*simple_shape(shape).ok_or("`filled` fills simple shapes")?,
+            *cell_size,
+        ),
+        Body::Mesh { path, cell_size, scale, z_up } => {
+            let tets = tetrahedra(&folder.join(path), *cell_size, *scale, *z_up)?;
+            DeformableBodyBuilder::mesh(&tets)
+        }
+        Body::Cloth { half_extents, cells, thickness } => {
+            DeformableBodyBuilder::cloth(*half_extents, *cells, *thickness)
+        }
+        Body::Rope { points, segments, radius } => {
+            DeformableBodyBuilder::rope(&polyline(points, *segments), *radius)
+        }
+        Body::Network { half_extents, cells } => {
+            let mesh = TetMesh::cuboid(half_extents.map(f64::from), *cells).map_err(|e| e.to_string())?;
+            DeformableBodyBuilder::spring_network(&mesh)
+        }
+    })
+}
+
+/// The tetrahedra of a file, or those that its surface is filled with.
+fn tetrahedra(path: &Path, cell_size: Option<f32>, scale: f32, z_up: bool) -> Result<TetMesh, String> {
+    let extension = path.extension().map_or(String::new(), |e| e.to_string_lossy().to_lowercase());
+    if !["obj", "stl", "ply", "gltf", "glb"].contains(&extension.as_str()) {
+        let mesh = TetMesh::read(path).map_err(|e| e.to_string())?;
+        return mesh.scaled(f64::from(scale)).map_err(|e| e.to_string());
+    }
+    let surface = surface(path, scale, z_up)?;
+    let (surface, _) =
+        surface.repaired(&SurfaceRepair::default()).map_err(|e| format!("{}: {e}", path.display()))?;
+    let whole = Aabb::from_points(surface.vertices.iter().copied());
+    let size = cell_size.unwrap_or(2.0 * whole.half_extents().max_element() / CELLS_ACROSS);
+    surface.filled(size).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// The preset of a body, changed by the other keys of its solver.
+fn solved_by(builder: DeformableBodyBuilder, asked: &scene::Solver) -> DeformableBodyBuilder {
+    let builder = match asked.fidelity {
+        Some(scene::Fidelity::Preview) => builder.fidelity(Fidelity::Preview),
+        Some(scene::Fidelity::Game) => builder.fidelity(Fidelity::Game),
+        Some(scene::Fidelity::Engineering) => builder.fidelity(Fidelity::Engineering),
+        Some(scene::Fidelity::Reference) => builder.fidelity(Fidelity::Reference),
+        None => builder,
+    };
+    builder.tune(|settings| {
+        if let Some(kind) = asked.kind {
+            settings.solver = match kind {
+                scene::SolverKind::Projective => Solver::Projective,
+                scene::SolverKind::ConjugateGradients => Solver::ConjugateGradients,
+                scene::SolverKind::GaussSeidel => Solver::GaussSeidel,
+                scene::SolverKind::Jacobi => Solver::Jacobi,
+                scene::SolverKind::Newton => Solver::Newton,
+            };
+        }
+        if let Some(system) = asked.system {
+            settings.system = match system {
+                scene::System::Laplacian => SystemMatrix::Laplacian,
+                scene::System::RestStiffness => SystemMatrix::RestStiffness,
+            };
+        }
+        if let Some(frames) = asked.frames {
+            settings.frames = match frames {
+                scene::Frames::Floating => Frames::Floating,
+                scene::Frames::PerNode => Frames::PerNode,
+                scene::Frames::Automatic => Frames::Automatic,
+            };
+        }
+        settings.max_iterations = asked.max_iterations.unwrap_or(settings.max_iterations);
+        settings.tolerance = asked.tolerance.unwrap_or(settings.tolerance);
+        settings.contact_tolerance = asked.contact_tolerance.unwrap_or(settings.contact_tolerance);
+        settings.acceleration = match asked.lbfgs {
+            Some(0) => Acceleration::None,
+            Some(window) => Acceleration::Lbfgs { window },
+            None => settings.acceleration,
+        };
+    })
+}
+
+/// A body as its file describes it.
+pub(super) fn deformable(body: &scene::Deformable, folder: &Path) -> Result<DeformableBodyBuilder, String> {
+    let builder = solved_by(mesh(body.body.as_ref(), folder)?, &body.solver);
+    let builder = builder
+        .pose(pose(body.translation, body.rotation))
+        .linvel(body.linvel.into())
+        .angvel(body.angvel.into())
+        .material(body.material.as_ref().to_material())
+        // What a scene expects of rest is to be found awake.
+        .can_sleep(false);
+    let builder = builder.self_contact(body.self_contact);
+    Ok(match body.pinned.clone() {
+        Some(regions) => builder.pinned(move |x| {
+            let within = |r: &scene::Region| x.cmpge(r.min.into()).all() && x.cmple(r.max.into()).all();
+            regions.all().iter().any(within)
+        }),
+        None => builder,
+    })
+}

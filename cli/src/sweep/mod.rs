@@ -1,0 +1,9 @@
+//! Many cases of a scene: what they are, running them side by side, and the table of what they come to.
+
+mod cases;
+mod jobs;
+mod table;
+
+pub use cases::{Case, cases};
+pub use jobs::{Done, Job, JobOptions, jobs, read, run_jobs};
+pub use table::{Row, Summary, Table};
