@@ -28,6 +28,10 @@ const ROOMS: [&[&str]; 13] = [
 const SOLVER: [&[&str]; 7] =
     [&["counters"], &["linear"], &["body_step"], &["acceleration"], &["cone"], &["constraints"], &["island"]];
 
+/// Within the command's package, from the ground up.
+const CLI: [&[&str]; 8] =
+    [&["scene"], &["stage"], &["run"], &["sweep"], &["baseline"], &["picture"], &["report"], &["command"]];
+
 /// Lines of a file, and of a function, at the most.
 const LONGEST_FILE: usize = 400;
 const LONGEST_FUNCTION: usize = 60;
@@ -111,6 +115,19 @@ fn imports_within_the_solver_point_downward_only() {
 }
 
 #[test]
+fn imports_within_the_command_point_downward_only() {
+    let mut seen = 0;
+    for (name, text) in whole_files("cli/src") {
+        let room = name.split('/').next().unwrap().trim_end_matches(".rs");
+        match level(&CLI, room) {
+            Some(own) => seen += looks_up(&CLI, own, &name, &text, "crate::"),
+            None => assert!(["lib", "main"].contains(&room), "{name} belongs to no room"),
+        }
+    }
+    assert!(seen > 20, "the test reads the imports: {seen}");
+}
+
+#[test]
 fn what_users_name_does_not_know_the_steps_inside() {
     for (name, text) in files() {
         let is_outside = name.starts_with("pipeline/") && !name.starts_with("pipeline/step/");
@@ -138,7 +155,7 @@ fn libraries_are_named_only_where_they_belong() {
 
 #[test]
 fn files_and_functions_are_short() {
-    for folder in ["src", "tests", "benches", "examples"] {
+    for folder in ["src", "tests", "benches", "examples", "cli/src", "cli/tests"] {
         for (name, text) in whole_files(folder) {
             let lines = text.lines().count();
             assert!(lines <= LONGEST_FILE, "{folder}/{name} has {lines} lines");

@@ -20,6 +20,20 @@ impl DeformableBody {
         self.model.weigh(&self.materials, |material| material.density)
     }
 
+    /// Mass of each vertex \[kg\]; they sum to [`DeformableBody::mass`].
+    ///
+    /// ```
+    /// use foible3d::prelude::*;
+    /// use rapier3d::prelude::*;
+    /// let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.5), [2, 2, 2]).build()?;
+    /// assert!((cube.vertex_masses().iter().sum::<f64>() - cube.mass()).abs() < 1e-9 * cube.mass());
+    /// # Ok::<(), DeformableBodyError>(())
+    /// ```
+    pub fn vertex_masses(&self) -> Vec<f64> {
+        let masses: Vec<f64> = (0..self.state.x.len()).map(|n| self.node_mass(n)).collect();
+        self.in_user_order(&masses)
+    }
+
     /// Centre of mass \[m\].
     pub fn center_of_mass(&self) -> [f64; 3] {
         self.weighted_mean(&self.state.x).into()

@@ -170,7 +170,7 @@ impl DeformableBody {
         self.model.surface.triangles.iter().filter(meant).map(area).sum()
     }
 
-    fn in_user_order<T: Copy>(&self, of_node: &[T]) -> Vec<T> {
+    pub(super) fn in_user_order<T: Copy>(&self, of_node: &[T]) -> Vec<T> {
         (0..of_node.len()).filter_map(|vertex| Some(of_node[self.model.node(vertex)?])).collect()
     }
 

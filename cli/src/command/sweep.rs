@@ -98,7 +98,7 @@ impl Sweep {
     fn run(&self, jobs: &[Job]) -> Result<Vec<Done>, String> {
         let bar = bar(jobs.len() as u64, "cases");
         bar.enable_steady_tick(std::time::Duration::from_millis(250));
-        let finished = |_: usize, _: &Done| bar.inc(1);
+        let finished = |_: &Done| bar.inc(1);
         let options = JobOptions {
             jobs: self.jobs.unwrap_or_else(threads),
             replay_rate: self.replay_rate.max(0.0),

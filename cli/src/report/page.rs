@@ -139,6 +139,8 @@ fn add_plots(body: &mut String, trace: &Trace) {
     let columns = |ends: &str| -> Vec<Line<'_>> {
         let names =
             trace.names.iter().enumerate().filter_map(|(k, name)| Some((k, name.strip_suffix(ends)?)));
+        // What never moves is no line.
+        let names = names.filter(|(k, _)| trace.rows.windows(2).any(|rows| rows[0][*k] != rows[1][*k]));
         names.map(|(k, name)| (name, trace.rows.iter().map(|row| [row[0], row[k]]).collect())).collect()
     };
     let forces: Vec<Line<'_>> = trace

@@ -87,6 +87,8 @@ fn steps(
     let scene = &file.scene;
     let (steps, dt) = scene.steps();
     let mut signals = Signals::new(scene, stage);
+    let mut watched = scene.measure.iter().chain(&scene.expect);
+    let watches_losses = watched.any(|e| e.quantity.as_ref().is_of_steps());
     run.trace = Trace::new(stage);
     run.replay = (options.replay_rate > 0.0).then(|| Replay::new(scene, stage, options.replay_rate));
     for step in 1..=steps {
@@ -95,7 +97,13 @@ fn steps(
             return;
         }
         stage::drive(scene, stage, ((step - 1) as f64 * dt) as f32, dt as f32);
+        if watches_losses {
+            stage.begin_losses();
+        }
         stage.world.step(&mut stage.physics);
+        if watches_losses {
+            stage.end_losses();
+        }
         let time = step as f64 * dt;
         signals.record(stage);
         run.trace.record(time, stage);

@@ -29,7 +29,7 @@ impl Replay {
             "least": bounds[0], "largest": bounds[1], "stress": largest,
         });
         let mut header = header.to_string();
-        while header.len() % 4 != 0 {
+        while !header.len().is_multiple_of(4) {
             header.push(' ');
         }
         let mut bytes = (header.len() as u32).to_le_bytes().to_vec();

@@ -138,6 +138,7 @@ fn reduced(take: Take, values: &[f64], dt: f64, within: f64) -> f64 {
         Take::Max => largest(all()),
         Take::Min => -largest(all().map(|v| -v)),
         Take::Peak => largest(all().map(f64::abs)),
+        Take::Range => largest(all()) + largest(all().map(|v| -v)),
         Take::Mean => all().sum::<f64>() / values.len() as f64,
         Take::Integral => all().sum::<f64>() * dt,
         Take::PulseTime => pulse(values) * dt,

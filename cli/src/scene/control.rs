@@ -9,10 +9,13 @@ use toml::Spanned;
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Attach {
+    /// A soft body.
     #[schemars(with = "String")]
     pub deformable: Spanned<String>,
+    /// A rigid body.
     #[schemars(with = "String")]
     pub to: Spanned<String>,
+    /// Surface vertices in this box of the world are held where they are.
     pub region: Region,
 }
 
@@ -20,11 +23,13 @@ pub struct Attach {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Move {
+    /// A kinematic body.
     #[schemars(with = "String")]
     pub of: Spanned<String>,
     /// Begin and end [s].
     #[schemars(with = "[f32; 2]")]
     pub during: Spanned<[f32; 2]>,
+    /// How far it goes \[m\].
     pub by: Vec3,
     /// Periods to and fro; comes back to where it was then.
     pub swings: Option<u32>,

@@ -5,46 +5,63 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
+/// A soft body.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Deformable {
+    /// Unique among all names of the scene.
     #[schemars(with = "String")]
     pub name: Spanned<String>,
+    /// Its shape.
     #[schemars(with = "Body")]
     pub body: Spanned<Body>,
+    /// What it is made of.
     #[schemars(with = "Material")]
     pub material: Spanned<Material>,
+    /// Where it is \[m\].
     #[serde(default)]
     pub translation: Vec3,
     /// Axis times angle [degrees].
     #[serde(default)]
     pub rotation: Vec3,
+    /// Velocity \[m/s\].
     #[serde(default)]
     pub linvel: Vec3,
+    /// Angular velocity \[rad/s\].
     #[serde(default)]
     pub angvel: Vec3,
     /// Vertices in this box of the world, or in one of several, are pinned.
     pub pinned: Option<Regions>,
+    /// Whether it collides with itself.
     #[serde(default)]
     pub self_contact: bool,
+    /// How it is solved.
     #[serde(default)]
     pub solver: Solver,
 }
 
+/// The shape of a soft body.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Body {
+    /// A cuboid, cut into cells and those into tetrahedra.
     Lattice {
+        /// Half its sides \[m\].
         half_extents: Vec3,
+        /// Along x, y and z.
         cells: [usize; 3],
     },
+    /// A simple shape, filled with tetrahedra.
     Filled {
+        /// What is filled.
         shape: Shape,
+        /// Size of the tetrahedra \[m\].
         cell_size: f32,
     },
     /// A file, relative to the scene file: tetrahedra from Gmsh, TetGen, MEDIT and VTK files, or a closed surface from OBJ, STL, PLY
     /// and glTF ones, which is repaired and filled.
     Mesh {
+        /// Relative to the scene file.
         path: String,
         /// Size of the tetrahedra \[m\] that a surface is filled with; a twelfth of its size if not given.
         cell_size: Option<f32>,
@@ -57,38 +74,55 @@ pub enum Body {
     },
     /// A rectangle of triangles in the plane of x and z.
     Cloth {
+        /// Half its sides \[m\].
         half_extents: [f32; 2],
+        /// Along x and z.
         cells: [usize; 2],
+        /// \[m\]
         thickness: f32,
     },
     /// A polyline, cut into `segments` of equal length.
     Rope {
+        /// Through these \[m\].
         points: Vec<Vec3>,
+        /// How many.
         segments: usize,
+        /// \[m\]
         radius: f32,
     },
     /// The edges of a lattice as springs.
     Network {
+        /// Half its sides \[m\].
         half_extents: Vec3,
+        /// Along x, y and z.
         cells: [usize; 3],
     },
 }
 
+/// What a soft body is made of.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
+    /// Young's modulus \[Pa\].
     pub youngs_modulus: f64,
+    /// Poisson's ratio, up to 0.4999.
     pub poisson_ratio: f64,
+    /// \[kg/m³\] (1000).
     #[serde(default = "density")]
     pub density: f64,
+    /// Coefficient of friction (0.5).
     #[serde(default = "soft_friction")]
     pub friction: f64,
+    /// Coefficient of restitution.
     #[serde(default)]
     pub restitution: f64,
+    /// Mass damping \[1/s\].
     #[serde(default)]
     pub mass_damping: f64,
+    /// Stiffness damping \[s\].
     #[serde(default)]
     pub stiffness_damping: f64,
+    /// The elastic law.
     #[serde(default)]
     pub elasticity: Elasticity,
     /// Least and largest stretch.
@@ -106,17 +140,23 @@ fn soft_friction() -> f64 {
     0.5
 }
 
+/// The elastic law.
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Elasticity {
+    /// Linear in strains, rotations taken off.
     #[default]
     LinearCorotated,
+    /// Projective Dynamics' own.
     Projective,
+    /// Exact in volume, rotations taken off.
     FixedCorotated,
+    /// Stable neo-Hookean.
     NeoHookean,
 }
 
 impl Material {
+    /// The material of the crate.
     pub fn to_material(&self) -> foible3d::DeformableMaterial {
         let material = foible3d::DeformableMaterial::new(self.youngs_modulus, self.poisson_ratio)
             .density(self.density)
@@ -143,21 +183,28 @@ impl Material {
     }
 }
 
+/// A box of the world.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
+    /// Least corner \[m\].
     pub min: Vec3,
+    /// Largest corner \[m\].
     pub max: Vec3,
 }
 
+/// One box, or several.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "a box `{ min, max }` or a list of such")]
 pub enum Regions {
+    /// One.
     One(Region),
+    /// Several.
     Several(Vec<Region>),
 }
 
 impl Regions {
+    /// All of them.
     pub fn all(&self) -> &[Region] {
         match self {
             Self::One(region) => std::slice::from_ref(region),
@@ -166,51 +213,88 @@ impl Regions {
     }
 }
 
+/// How a soft body is solved.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Solver {
     /// A preset that the other keys change.
     pub fidelity: Option<Fidelity>,
+    /// The solver.
     pub kind: Option<SolverKind>,
+    /// The constant matrix.
     pub system: Option<System>,
+    /// What the constant matrix turns with.
     pub frames: Option<Frames>,
+    /// The formula of a step.
+    pub integrator: Option<Integrator>,
+    /// Iterations of a step, at the most.
     pub max_iterations: Option<usize>,
+    /// Residual where iterations end, over the forces.
     pub tolerance: Option<f64>,
+    /// The same of contacts.
     pub contact_tolerance: Option<f64>,
     /// Pairs of L-BFGS; 0 for none.
     pub lbfgs: Option<usize>,
 }
 
+/// Speed against accuracy: presets.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fidelity {
+    /// The fastest.
     Preview,
+    /// For games.
     Game,
+    /// For measurements.
     Engineering,
+    /// Converged.
     Reference,
 }
 
+/// Solvers.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverKind {
+    /// Projective Dynamics.
     Projective,
+    /// Conjugate gradients.
     ConjugateGradients,
+    /// Gauss–Seidel.
     GaussSeidel,
+    /// Jacobi.
     Jacobi,
+    /// Newton's method.
     Newton,
 }
 
+/// Constant matrices.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum System {
+    /// The stiffness at rest.
     RestStiffness,
+    /// Projective Dynamics' Laplacian.
     Laplacian,
 }
 
+/// What the constant matrix turns with.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Frames {
+    /// As the body asks for.
     Automatic,
+    /// One frame.
     Floating,
+    /// A frame per node.
     PerNode,
+}
+
+/// Formulas of a step.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Integrator {
+    /// The first order: takes energy from vibrations.
+    ImplicitEuler,
+    /// The second order, in flight and in contact.
+    Bdf2,
 }

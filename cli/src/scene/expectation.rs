@@ -111,6 +111,11 @@ pub enum Quantity {
     GravityEnergy,
     /// All three together \[J\].
     Energy,
+    /// Energy that steps have taken so far, not forces \[J\]: of rigid bodies, and of soft ones with implicit Euler. What an
+    /// impact takes is a part of it.
+    StepLoss,
+    /// `energy` and `step_loss` together \[J\]: only friction, damping and what moves bodies from outside change it.
+    EnergyBalance,
     /// Largest von Mises stress in a solid deformable \[Pa\].
     Stress,
     /// Largest principal strain, by size, in a solid deformable.
@@ -130,6 +135,8 @@ pub enum Take {
     Min,
     /// The largest by size.
     Peak,
+    /// The largest less the least.
+    Range,
     /// The mean over time.
     Mean,
     /// The integral over time: impulse of a force, velocity change of an acceleration.
@@ -160,7 +167,20 @@ impl Quantity {
 
     /// Whether the whole scene has it too.
     pub fn is_energy(self) -> bool {
-        matches!(self, Self::KineticEnergy | Self::ElasticEnergy | Self::GravityEnergy | Self::Energy)
+        matches!(
+            self,
+            Self::KineticEnergy
+                | Self::ElasticEnergy
+                | Self::GravityEnergy
+                | Self::Energy
+                | Self::StepLoss
+                | Self::EnergyBalance
+        )
+    }
+
+    /// Whether it is summed over steps.
+    pub fn is_of_steps(self) -> bool {
+        matches!(self, Self::StepLoss | Self::EnergyBalance)
     }
 
     /// Whether it is between two bodies.
@@ -189,7 +209,12 @@ impl Quantity {
             Self::AccelerationG => "g",
             Self::Force | Self::ForceSize => "N",
             Self::Tilt => "°",
-            Self::KineticEnergy | Self::ElasticEnergy | Self::GravityEnergy | Self::Energy => "J",
+            Self::KineticEnergy
+            | Self::ElasticEnergy
+            | Self::GravityEnergy
+            | Self::Energy
+            | Self::StepLoss
+            | Self::EnergyBalance => "J",
             Self::Stress => "Pa",
             Self::VolumeRatio | Self::Strain => "",
         }

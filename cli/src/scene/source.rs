@@ -26,6 +26,8 @@ struct File {
 struct Edit {
     at: Range<usize>,
     text: String,
+    /// The path that it sets, where it is no value of the file.
+    set: Option<String>,
 }
 
 /// The files of a scene as one text.
@@ -128,8 +130,10 @@ impl Source {
         for (path, value) in paths {
             let said = |what| SceneError::of_set(path, what);
             let place = values::place_of(table.get_ref(), &whole, path).map_err(said)?;
+            let value = value.trim_matches('"');
             let value = values.replacement(value).map_err(said)?.unwrap_or_else(|| values::literal(value));
-            edits.push(Edit { at: place.at, text: format!("{}{value}{}", place.before, place.after) });
+            let text = format!("{}{value}{}", place.before, place.after);
+            edits.push(Edit { at: place.at, text, set: Some(path.clone()) });
         }
         for (key, value) in table.get_ref() {
             if key.get_ref() != "parameters" && key.get_ref() != "sweep" {
@@ -162,7 +166,7 @@ impl Source {
                 let replaced = parameters
                     .replacement(text)
                     .map_err(|what| self.error(value.span(), format!("`{key}`: {what}")))?;
-                edits.extend(replaced.map(|text| Edit { at: value.span(), text }));
+                edits.extend(replaced.map(|text| Edit { at: value.span(), text, set: None }));
             }
             DeValue::Array(values) => {
                 values.iter().try_for_each(|value| self.collect(key, value, parameters, edits))?;
@@ -176,8 +180,8 @@ impl Source {
         Ok(())
     }
 
-    /// Where a place of the resolved text was in the files' own.
-    fn original(&self, place: usize) -> usize {
+    /// Where a place of the resolved text was in the files' own, and what was set there.
+    fn original(&self, place: usize) -> (usize, Option<&str>) {
         let mut shift = 0isize;
         for edit in &self.edits {
             let start = edit.at.start.saturating_add_signed(shift);
@@ -185,16 +189,17 @@ impl Source {
                 break;
             }
             if place < start + edit.text.len() {
-                return edit.at.start;
+                return (edit.at.start, edit.set.as_deref());
             }
             shift += edit.text.len() as isize - edit.at.len() as isize;
         }
-        place.saturating_add_signed(-shift)
+        (place.saturating_add_signed(-shift), None)
     }
 
     /// What is wrong at a place of the resolved text.
     pub fn error(&self, at: Range<usize>, what: String) -> SceneError {
-        let mut place = self.original(at.start);
+        let (mut place, set) = self.original(at.start);
+        let what = set.map_or_else(|| what.clone(), |set| format!("--set {set}: {what}"));
         for (k, file) in self.files.iter().enumerate() {
             if place > file.text.len() || (place == file.text.len() && k + 1 < self.files.len()) {
                 place -= file.text.len();

@@ -83,6 +83,31 @@ pub fn with_unit(text: &str) -> Option<Result<f64, String>> {
     }))
 }
 
+/// Names that formulas have for themselves.
+const CONSTANTS: [&str; 6] = ["PI", "π", "E", "e", "TAU", "τ"];
+
+/// Numbers like 9e-4 written out: the library of formulas takes the e for Euler's number.
+fn written_out(text: &str) -> String {
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some(start) = rest.find(|c: char| c.is_ascii_digit() || c == '.') {
+        let (before, number) = rest.split_at(start);
+        out.push_str(before);
+        let is_name = out.ends_with(|c: char| c.is_alphanumeric() || c == '_');
+        let digits = number.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(number.len());
+        let power =
+            number[digits..].strip_prefix(['e', 'E']).map(|p| p.strip_prefix(['+', '-']).unwrap_or(p));
+        let places = power.map_or(0, |p| p.find(|c: char| !c.is_ascii_digit()).unwrap_or(p.len()));
+        let end = if places == 0 { digits } else { number.len() - power.map_or(0, str::len) + places };
+        match number[..end].parse::<f64>() {
+            Ok(value) if places > 0 && !is_name => out.push_str(&format!("{value}")),
+            _ => out.push_str(&number[..end]),
+        }
+        rest = &number[end..];
+    }
+    out + rest
+}
+
 /// A formula over named values.
 fn formula(text: &str, values: &BTreeMap<String, String>) -> Result<f64, String> {
     use exmex::Express;
@@ -90,16 +115,14 @@ fn formula(text: &str, values: &BTreeMap<String, String>) -> Result<f64, String>
     if text.len() > 500 {
         return Err("this formula is longer than 500 characters".into());
     }
+    let text = written_out(text);
     let parsed =
-        std::panic::catch_unwind(|| exmex::parse::<f64>(text)).map_err(|_| "is no formula".to_string())?;
+        std::panic::catch_unwind(|| exmex::parse::<f64>(&text)).map_err(|_| "is no formula".to_string())?;
     let parsed = parsed.map_err(|error| format!("is no formula: {error}"))?;
     let number = |name: &String| {
         let text = values.get(name).ok_or_else(|| {
-            let known: Vec<&str> = values.keys().map(String::as_str).collect();
-            format!(
-                "\"{name}\" is no parameter; there are: {}",
-                if known.is_empty() { "none".into() } else { known.join(", ") }
-            )
+            let known: Vec<String> = values.keys().cloned().collect();
+            format!("is no parameter; {}", super::mistake::none_such(name, &known))
         })?;
         text.parse::<f64>().map_err(|_| format!("\"{name}\" is {text}, which is no number"))
     };
@@ -129,23 +152,29 @@ impl Parameters {
         let Some(own_table) = own.get_ref().as_table() else {
             return Err((own.span(), "`parameters` must be a table".into()));
         };
-        found.take(own_table, text);
+        found.take(own_table, text)?;
         for (_, value) in own_table.iter() {
             if let Some(included) = value.get_ref().as_table() {
-                found.take(included, text);
+                found.take(included, text)?;
             }
         }
         Ok(found)
     }
 
-    fn take(&mut self, table: &DeTable<'_>, text: &str) {
+    fn take(&mut self, table: &DeTable<'_>, text: &str) -> Result<(), Mistake> {
         for (key, value) in table.iter().filter(|(_, value)| value.get_ref().as_table().is_none()) {
+            if CONSTANTS.contains(&key.get_ref().as_ref()) {
+                let what =
+                    format!("`{}` is a number of its own in formulas; take another name", key.get_ref());
+                return Err((key.span(), what));
+            }
             let own = match value.get_ref() {
                 DeValue::String(own) => own.to_string(),
                 _ => text[value.span()].to_string(),
             };
             self.texts.entry(key.get_ref().to_string()).or_insert((value.span(), own));
         }
+        Ok(())
     }
 
     /// Whether there is such a parameter; then it is set.
@@ -249,7 +278,11 @@ pub fn place_of(table: &DeTable<'_>, text: &str, path: &str) -> Result<Place, St
     if let Some(value) = table.get(last) {
         return Ok(Place { at: value.span(), before: String::new(), after: String::new() });
     }
-    let inline = own.filter(|at| text[at.clone()].starts_with('{'));
+    let Some(own) = own else {
+        let names: Vec<String> = table.keys().map(|k| k.get_ref().to_string()).collect();
+        return Err(format!("is no parameter; {}", super::mistake::none_such(last, &names)));
+    };
+    let inline = Some(own).filter(|at| text[at.clone()].starts_with('{'));
     if let Some(at) = inline {
         let (close, comma) = (at.end - 1, if table.is_empty() { "" } else { ", " });
         return Ok(Place { at: close..close, before: format!("{comma}{last} = "), after: " ".into() });
@@ -272,4 +305,36 @@ fn entry<'a, 'i>(entries: &'a [Spanned<DeValue<'i>>], which: &str) -> Option<&'a
 fn entry_names(entries: &[Spanned<DeValue<'_>>]) -> Vec<String> {
     let names = entries.iter().enumerate();
     names.map(|(k, entry)| name_of(entry).map_or(k.to_string(), String::from)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formulas_know_powers_of_ten_and_parameters() {
+        let values = BTreeMap::from([("height".to_string(), "2.5".to_string()), ("e2".into(), "7".into())]);
+        let of = |text: &str| formula(text, &values);
+        assert_eq!(of("2*height + 1e-3"), Ok(5.001));
+        assert_eq!(of("1.5E3 - .5e+1"), Ok(1495.0));
+        assert_eq!(of("e2*2"), Ok(14.0));
+        assert!((of("exp(1) - e").unwrap()).abs() < 1e-12);
+        assert!((of("(1 + 3)^0.5 - sqrt(4)").unwrap()).abs() < 1e-12);
+        for wrong in ["2*hight", "1/0", "2 +", "", "((", "1e999"] {
+            assert!(of(wrong).is_err(), "{wrong}");
+        }
+        assert!(of("2*hight").unwrap_err().contains("height"));
+        assert!(of(&"(".repeat(10_000)).is_err());
+    }
+
+    #[test]
+    fn units_are_those_of_the_si() {
+        assert_eq!(with_unit("5 cm"), Some(Ok(0.05)));
+        assert_eq!(with_unit("0.3MPa"), Some(Ok(0.3e6)));
+        assert_eq!(with_unit("-2e-3 m"), Some(Ok(-2e-3)));
+        assert_eq!(with_unit("1e3"), Some(Ok(1e3)));
+        assert!(with_unit("5 parsec").unwrap().unwrap_err().contains("MPa"));
+        assert_eq!(with_unit("floor"), None);
+        assert_eq!(with_unit("-"), None);
+    }
 }

@@ -142,6 +142,8 @@ impl Stage {
             Quantity::KineticEnergy => kinetic,
             Quantity::ElasticEnergy => elastic,
             Quantity::GravityEnergy => gravity,
+            Quantity::StepLoss => self.step_loss(of),
+            Quantity::EnergyBalance => kinetic + elastic + gravity + self.step_loss(of),
             _ => kinetic + elastic + gravity,
         }
     }

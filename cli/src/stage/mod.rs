@@ -3,6 +3,7 @@
 mod drive;
 mod fall;
 mod joints;
+mod losses;
 mod measure;
 mod shapes;
 mod soft;
@@ -33,6 +34,7 @@ pub struct Stage {
     pub motors: Vec<Motored>,
     /// Where everything is at the start.
     start: BTreeMap<String, Start>,
+    losses: losses::Losses,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +62,7 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
         probes: Vec::new(),
         motors: Vec::new(),
         start: BTreeMap::new(),
+        losses: losses::Losses::default(),
     };
     scene.rigid.iter().try_for_each(|body| stage.add_rigid(body, folder))?;
     scene.joint.iter().try_for_each(|joint| stage.join(joint))?;

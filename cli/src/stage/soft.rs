@@ -101,6 +101,12 @@ fn solved_by(builder: DeformableBodyBuilder, asked: &scene::Solver) -> Deformabl
                 scene::Frames::Automatic => Frames::Automatic,
             };
         }
+        if let Some(integrator) = asked.integrator {
+            settings.integrator = match integrator {
+                scene::Integrator::ImplicitEuler => Integrator::ImplicitEuler,
+                scene::Integrator::Bdf2 => Integrator::Bdf2,
+            };
+        }
         settings.max_iterations = asked.max_iterations.unwrap_or(settings.max_iterations);
         settings.tolerance = asked.tolerance.unwrap_or(settings.tolerance);
         settings.contact_tolerance = asked.contact_tolerance.unwrap_or(settings.contact_tolerance);

@@ -50,7 +50,7 @@ pub struct JobOptions<'a> {
     /// Told of a job that goes on, by its number, and its steps that are done.
     pub progress: Option<&'a (dyn Fn(usize, u64) + Sync)>,
     /// Told of a job that is finished.
-    pub finished: Option<&'a (dyn Fn(usize, &Done) + Sync)>,
+    pub finished: Option<&'a (dyn Fn(&Done) + Sync)>,
 }
 
 /// The jobs of a sweep: each case in a folder of its number.
@@ -90,7 +90,7 @@ pub fn run_jobs(jobs: &[Job], options: &JobOptions<'_>) -> Result<Vec<Done>, Str
                 return;
             };
             if let (Ok(done), Some(finished)) = (&result, options.finished) {
-                finished(k, done);
+                finished(done);
             }
             done.lock().unwrap_or_else(|e| e.into_inner()).push((k, result));
         }

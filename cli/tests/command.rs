@@ -1,0 +1,111 @@
+//! The command as people use it.
+
+mod common;
+
+use common::{SCENES, foible_exits, folder};
+use std::path::Path;
+
+const BLOCK: &str = "v 0 0 0\nv 100 0 0\nv 100 60 0\nv 0 60 0\nv 0 0 40\nv 100 0 40\nv 100 60 40\nv 0 60 40\n\
+    f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+
+fn replace(path: &Path, from: &str, to: &str) {
+    let text = std::fs::read_to_string(path).unwrap();
+    assert!(text.contains(from), "{from}");
+    std::fs::write(path, text.replace(from, to)).unwrap();
+}
+
+/// From nothing to a failing and then a passing drop test of one's own mesh, in the five commands of the README.
+#[test]
+fn a_newcomer_drops_a_mesh_of_their_own() {
+    let folder = folder("newcomer");
+    std::fs::write(folder.join("part.obj"), BLOCK).unwrap();
+    foible_exits(&folder, &["new", "drop.toml", "--mesh", "part.obj", "--scale", "0.001"], 0);
+    let said = foible_exits(&folder, &["check", "drop.toml"], 0);
+    assert!(said.contains("12 cases"), "{said}");
+    let said = foible_exits(&folder, &["run", "drop.toml"], 1);
+    assert!(said.contains("FAILED peak acceleration") && said.contains("ok     comes to rest"), "{said}");
+    replace(&folder.join("drop.toml"), "at_most = 1.0", "at_most = 250.0");
+    let said = foible_exits(&folder, &["run", "drop.toml"], 0);
+    assert!(said.contains("1 scenes, 0 failures"), "{said}");
+    for file in ["outcome.json", "costs.json", "trace.csv", "plot.svg", "index.html"] {
+        assert!(folder.join("target/scenes/drop").join(file).exists(), "{file}");
+    }
+    // What is there is not written over.
+    let said = foible_exits(&folder, &["new", "drop.toml"], 2);
+    assert!(said.contains("is there already"), "{said}");
+    foible_exits(&folder, &["new", "cube.toml"], 0);
+    foible_exits(&folder, &["check", "cube.toml"], 0);
+}
+
+#[test]
+fn a_baseline_is_kept_and_what_moves_is_told() {
+    let folder = folder("baseline");
+    std::fs::copy(format!("{SCENES}/slope.toml"), folder.join("slope.toml")).unwrap();
+    foible_exits(&folder, &["bless", "slope.toml"], 0);
+    foible_exits(&folder, &["run", "slope.toml"], 0);
+    foible_exits(&folder, &["bless", "slope.toml", "--check"], 0);
+    replace(&folder.join("slope.toml"), "friction = 0.3 }", "friction = 0.301 }");
+    let said = foible_exits(&folder, &["run", "slope.toml", "--junit", "out.xml"], 1);
+    assert!(said.contains("DRIFT"), "{said}");
+    let xml = std::fs::read_to_string(folder.join("out.xml")).unwrap();
+    assert!(xml.contains("<testsuite name=\"slope\"") && xml.contains("<failure"), "{xml}");
+    foible_exits(&folder, &["bless", "slope.toml", "--check"], 1);
+    foible_exits(&folder, &["run", "slope.toml", "--no-baseline"], 0);
+}
+
+#[test]
+fn results_are_read_by_programs() {
+    let folder = folder("programs");
+    let scene = format!("{SCENES}/can_shelf.toml");
+    let output = common::foible(&folder, &["run", &scene, "--format", "json", "--set", "world.duration=1"]);
+    let read: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(read[0]["outcome"]["verdicts"].as_array().unwrap().len(), 5);
+    assert_eq!(read[0]["outcome"]["steps"], 120);
+    let said = foible_exits(&folder, &["report", "target/scenes/can_shelf", "--junit", "again.xml"], 0);
+    assert!(said.contains("can_shelf: 120 steps"), "{said}");
+    assert!(folder.join("again.xml").exists());
+}
+
+#[test]
+fn what_is_wrong_is_said_with_its_place() {
+    let folder = folder("wrong");
+    let scene = format!("{SCENES}/slope.toml");
+    for (arguments, says) in [
+        (vec!["run", "none.toml"], "none.toml"),
+        (vec!["run", &scene, "--set", "world.gravty=3"], "--set world.gravty: unknown field"),
+        (vec!["run", &scene, "--set", "dt=3"], "is no parameter"),
+        (vec!["run", &scene, "--set", "world.dt=\"5 parsec\""], "is no unit"),
+        (vec!["run", &scene, "--set", "deformable.cude.material.density=3"], "there is no `deformable.cude`"),
+        (vec!["sweep", &scene], "has no [sweep]"),
+        (vec!["replay", &scene], "--png"),
+        (vec!["report", "."], "there are no results"),
+    ] {
+        let said = foible_exits(&folder, &arguments, 2);
+        assert!(said.contains(says), "{arguments:?}: {said}");
+    }
+}
+
+#[test]
+fn pictures_and_films_are_written() {
+    let folder = folder("pictures");
+    let scene = format!("{SCENES}/can_shelf.toml");
+    let short = ["--set", "world.duration=0.2", "--size", "64x48"];
+    let arguments = [&["replay", &scene, "--png", "a.png", "--gif", "a.gif"][..], &short].concat();
+    foible_exits(&folder, &arguments, 0);
+    let png = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(folder.join("a.png")).unwrap()));
+    let mut png = png.read_info().unwrap();
+    let mut pixels = vec![0; png.output_buffer_size().unwrap()];
+    png.next_frame(&mut pixels).unwrap();
+    // Not one colour: something is seen, and not everywhere.
+    let corner = &pixels[..3];
+    let other = pixels.chunks(3).filter(|pixel| *pixel != corner).count();
+    assert!((200..64 * 48 - 200).contains(&other), "{other}");
+    let mut options = gif::DecodeOptions::new();
+    options.set_color_output(gif::ColorOutput::RGBA);
+    let mut film = options.read_info(std::fs::File::open(folder.join("a.gif")).unwrap()).unwrap();
+    let mut frames = 0;
+    while film.read_next_frame().unwrap().is_some() {
+        frames += 1;
+    }
+    assert_eq!(frames, 6);
+}

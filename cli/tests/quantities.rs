@@ -1,0 +1,114 @@
+//! What is measured, against closed forms.
+
+mod common;
+
+use common::{SCENES, number, outcome};
+use foible_cli::run::{RunOptions, run};
+use foible_cli::scene::SceneFile;
+
+/// Every scene whose expectations are derived, but for those that take longer.
+#[test]
+fn scenes_with_published_truth_come_to_it() {
+    for name in ["cushion_drop", "crates_on_foam", "can_shelf", "sack_pallet", "transit_drop"] {
+        let file = SceneFile::read(format!("{SCENES}/{name}.toml").as_ref(), &[]).unwrap();
+        let outcome = run(&file, &RunOptions::default()).outcome;
+        for verdict in &outcome.verdicts {
+            assert!(verdict.met, "{name}: {} is {:e}", verdict.measured.name, verdict.measured.value);
+        }
+        assert_eq!((outcome.error, outcome.verdicts.len() > 1), (None, true), "{name}");
+    }
+}
+
+/// A ball that is thrown: its path, what an accelerometer in it shows, and its energy.
+#[test]
+fn a_rigid_ball_in_flight() {
+    let thrown = outcome(
+        r#"
+        world = { duration = 1.0, dt = 0.001 }
+        rigid = [{ name = "ball", kind = "dynamic", shape = { ball = { radius = 0.1 } }, mass = 2.0, linvel = [3.0, 4.0, 0.0] }]
+        measure = [
+            { name = "y", quantity = "y", of = "ball", take = "max" },
+            { name = "drift", quantity = "drift", of = "ball" },
+            { name = "shown", quantity = "acceleration_g", of = "ball", take = "peak" },
+            { name = "mean speed up", quantity = "velocity_y", of = "ball", take = "mean", during = [0.4, 0.6] },
+            { name = "energy", quantity = "energy", of = "all", at = 0.001 },
+            { name = "balance", quantity = "energy_balance", of = "all", take = "range" },
+        ]
+        "#,
+    );
+    let near = |name: &str, value: f64, within: f64| {
+        assert!((number(&thrown, name) - value).abs() < within, "{name} {} {value}", number(&thrown, name));
+    };
+    near("y", 16.0 / (2.0 * 9.81), 5e-3);
+    near("drift", 3.0, 1e-3);
+    near("shown", 0.0, 1e-3);
+    near("mean speed up", 4.0 - 9.81 * 0.5, 1e-2);
+    near("energy", 25.0, 1e-2);
+    // 25 J, rounded to single precision a thousand times.
+    near("balance", 0.0, 1e-3);
+}
+
+/// A cube that lies on the floor, one that is pushed over, and forces between the two kinds of bodies.
+#[test]
+fn forces_impulses_and_windows() {
+    let lies = outcome(
+        r#"
+        world = { duration = 1.0, dt = 0.01 }
+        parameters = { weight = "=0.008*1000*9.81" }
+        rigid = [{ name = "floor", kind = "fixed", shape = { cuboid = { half_extents = [1, 0.1, 1] } }, translation = [0, "-10 cm", 0] }]
+        deformable = [{ name = "cube", body = { lattice = { half_extents = [0.1, 0.1, 0.1], cells = [2, 2, 2] } }, translation = [0, 0.1, 0],
+            material = { youngs_modulus = "1 MPa", poisson_ratio = 0.3 } }]
+        measure = [
+            { name = "impulse", quantity = "force", of = "cube", on = "floor", take = "integral", during = [0.5, 1.0] },
+            { name = "shown", quantity = "acceleration_g", of = "cube" },
+            { name = "other way", quantity = "force_size", of = "floor", on = "cube" },
+            { name = "none", quantity = "y", of = "cube", minus = "cube", take = "peak" },
+            { name = "tilt", quantity = "tilt", of = "cube", take = "peak" },
+        ]
+        expect = [
+            { name = "always", quantity = "force", of = "cube", on = "floor", during = [0.5, 1.0], holds = "always", equals = "=weight", within = 0.1 },
+            { name = "ever", quantity = "y", of = "cube", holds = "ever", at_most = 0.09999 },
+            { name = "never", quantity = "y", of = "cube", holds = "ever", at_most = 0.09 },
+            { name = "worst", quantity = "y", of = "cube", holds = "always", at_least = 0.2 },
+        ]
+        "#,
+    );
+    let weight = 8.0 * 9.81;
+    assert!((number(&lies, "impulse") / (0.5 * weight) - 1.0).abs() < 0.025, "{}", number(&lies, "impulse"));
+    assert!((number(&lies, "shown") - 9.81 / 9.80665).abs() < 1e-4);
+    assert!((number(&lies, "other way") - weight).abs() < 1e-2);
+    assert_eq!(number(&lies, "none"), 0.0);
+    assert!(number(&lies, "tilt") < 1e-2);
+    let met: Vec<bool> = lies.verdicts.iter().map(|v| v.met).collect();
+    assert_eq!(met, [true, true, false, false], "{:?}", lies.verdicts);
+    assert!(lies.verdicts[3].measured.value < 0.1, "the worst value is told");
+}
+
+/// A sealed drop on every face: the lowest point is where it was asked, and the speed that of the fall.
+#[test]
+fn a_drop_begins_just_above_the_floor_with_the_speed_of_the_fall() {
+    for down in [[0, -1, 0], [1, 0, 0], [0, 0, -1], [1, 1, 0], [1, -1, 1]] {
+        let start = outcome(&format!(
+            r#"
+            world = {{ duration = 0.001, dt = 0.001 }}
+            rigid = [{{ name = "box", kind = "dynamic", shape = {{ cuboid = {{ half_extents = [0.1, 0.2, 0.3] }} }}, collides = false, translation = [5, 7, 1] }}]
+            deformable = [{{ name = "foam", body = {{ lattice = {{ half_extents = [0.05, 0.05, 0.05], cells = [1, 1, 1] }} }}, translation = [5, 7, 1],
+                material = {{ youngs_modulus = 1e5, poisson_ratio = 0.3 }} }}]
+            drop = {{ members = ["box", "foam"], height = 0.8, onto = 0.5, gap = 0.1, orientation = {down:?} }}
+            measure = [{{ name = "y", quantity = "y", of = "box" }}, {{ name = "speed", quantity = "speed", of = "foam" }}]
+            "#
+        ));
+        // A way of [1, 1, 0] is not that of the edge of a box with other sides: its lowest corner is by the way itself.
+        let way = down.map(f64::from);
+        let long = way.iter().map(|w| w * w).sum::<f64>().sqrt();
+        let reach: f64 = way.iter().zip([0.1, 0.2, 0.3]).map(|(w, half)| w.abs() / long * half).sum();
+        let speed = (2.0 * 9.81 * 0.7f64).sqrt() + 9.81e-3;
+        let expected = 0.5 + 0.1 + reach - speed * 0.001;
+        assert!(
+            (number(&start, "y") - expected).abs() < 1e-4,
+            "{down:?}: {} {expected}",
+            number(&start, "y")
+        );
+        assert!((number(&start, "speed") - speed).abs() < 1e-3, "{down:?}");
+    }
+}
