@@ -10,8 +10,11 @@ fn text(path: &str) -> Option<String> {
 /// What stands between backticks and begins with a folder of tests or sources.
 fn references(text: &str) -> impl Iterator<Item = &str> {
     let quoted = text.split('`').skip(1).step_by(2);
-    quoted
-        .filter(|r| ["tests/", "benches/", "src/", "bevy/tests/"].iter().any(|folder| r.starts_with(folder)))
+    quoted.filter(|r| {
+        ["tests/", "benches/", "src/", "bevy/tests/", "cli/tests/", "cli/src/", "cli/benches/"]
+            .iter()
+            .any(|folder| r.starts_with(folder))
+    })
 }
 
 /// Whether a source holds a function of that name with `#[test]` among the attributes and comments above it, on
@@ -32,7 +35,7 @@ fn complaint(reference: &str) -> Option<String> {
     let Some(source) = text(path) else { return Some(format!("{path} does not exist")) };
     match name {
         Some(name) if !has_test(&source, name) => Some(format!("{path} has no test {name}")),
-        None if !path.starts_with("benches/") => Some(format!("{reference} names no test")),
+        None if !path.contains("benches/") => Some(format!("{reference} names no test")),
         _ => None,
     }
 }
@@ -66,7 +69,11 @@ fn what_the_readme_and_the_changelog_name_exists() {
         for (option, folder) in [("--test ", "tests"), ("--bench ", "benches")] {
             for rest in page_text.split(option).skip(1) {
                 let name: String = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-                let places = [format!("{folder}/{name}.rs"), format!("{folder}/{name}/main.rs")];
+                let places = ["", "cli/"].map(|package| format!("{package}{folder}/{name}"));
+                let places = places
+                    .iter()
+                    .flat_map(|p| [format!("{p}.rs"), format!("{p}/main.rs")])
+                    .collect::<Vec<_>>();
                 assert!(places.iter().any(|p| text(p).is_some()), "{page} names {option}{name}");
             }
         }

@@ -51,7 +51,7 @@ fn tags(text: &str) -> BTreeSet<String> {
 
 /// Paths between backticks: source files, and folders with a slash at the end.
 fn paths(text: &str) -> impl Iterator<Item = &str> {
-    let folders = ["src/", "tests/", "benches/", "examples/"];
+    let folders = ["src/", "tests/", "benches/", "examples/", "cli/"];
     let quoted = text.split('`').skip(1).step_by(2);
     quoted.filter(move |q| {
         folders.iter().any(|f| q.starts_with(f))
@@ -63,7 +63,7 @@ fn paths(text: &str) -> impl Iterator<Item = &str> {
 #[test]
 fn every_tag_is_listed_among_the_references() {
     let listed = text("docs/references.md");
-    let mut cited: BTreeSet<String> = sources_of(&["src"]).iter().flat_map(|s| tags(s)).collect();
+    let mut cited: BTreeSet<String> = sources_of(&["src", "cli/src"]).iter().flat_map(|s| tags(s)).collect();
     assert!(cited.len() >= 20, "the test reads the tags: {cited:?}");
     for page in ["docs/method.md", "README.md"] {
         cited.extend(tags(&text(page)));
@@ -74,8 +74,10 @@ fn every_tag_is_listed_among_the_references() {
 
 #[test]
 fn every_reference_is_cited() {
-    let mut cited: BTreeSet<String> =
-        sources_of(&["src", "tests", "benches", "examples"]).iter().flat_map(|s| tags(s)).collect();
+    let mut cited: BTreeSet<String> = sources_of(&["src", "tests", "benches", "examples", "cli/src"])
+        .iter()
+        .flat_map(|s| tags(s))
+        .collect();
     cited.extend(tags(&text("docs/method.md")));
     let listed = text("docs/references.md");
     let entries: Vec<&str> =

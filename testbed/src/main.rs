@@ -5,21 +5,13 @@
 //! held; what is rigid with the left. With `--picture OUT.png SECONDS` the first scene is run for so long, written as a picture,
 //! and the program ends.
 
-// What is measured of a stage is the runner's.
-#[allow(dead_code)]
-#[path = "../../examples/scene/build.rs"]
-mod build;
-#[path = "../../examples/scene/control.rs"]
-mod control;
 mod drag;
 mod drawn;
-#[path = "../../examples/scene/file/mod.rs"]
-mod file;
 
-use build::Stage;
 use drag::Drag;
 use drawn::DrawnBodies;
-use file::Scene;
+use foible_cli::scene::SceneFile;
+use foible_cli::stage::{self, Stage};
 use rapier_testbed3d::{ExampleEntry, TestbedViewer};
 use rapier3d::math::Vector;
 use rapier3d::prelude::Aabb;
@@ -53,7 +45,7 @@ async fn main() {
     }
 }
 
-type NamedScene = (String, PathBuf, Scene);
+type NamedScene = (String, SceneFile);
 
 fn arguments() -> Result<(Vec<NamedScene>, Option<Picture>), String> {
     let (mut files, mut picture) = (Vec::new(), None);
@@ -84,16 +76,13 @@ fn arguments() -> Result<(Vec<NamedScene>, Option<Picture>), String> {
 }
 
 fn read(path: PathBuf) -> Result<NamedScene, String> {
-    let said = |error: String| format!("{}: {error}", path.display());
-    let text = std::fs::read_to_string(&path).map_err(|e| said(e.to_string()))?;
-    let scene = file::parse(&text).map_err(said)?;
-    let name = path.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().replace('_', " "));
-    Ok((name, path, scene))
+    let file = SceneFile::read(&path, &[]).map_err(|error| format!("{}: {error}", path.display()))?;
+    Ok((file.name.replace('_', " "), file))
 }
 
 /// Runs a scene until another is chosen, or its picture is written.
-async fn run(viewer: &mut TestbedViewer, (name, path, scene): &NamedScene, picture: Option<&Picture>) {
-    let built = build::build(scene, path.parent().unwrap_or(Path::new(".")));
+async fn run(viewer: &mut TestbedViewer, (name, file): &NamedScene, picture: Option<&Picture>) {
+    let built = stage::build(&file.scene, &file.folder);
     let mut stage = match built {
         Ok(stage) => stage,
         Err(error) => {
@@ -114,7 +103,7 @@ async fn run(viewer: &mut TestbedViewer, (name, path, scene): &NamedScene, pictu
     while viewer.render_frame(&mut stage.physics).await {
         drag.update(viewer, &mut stage.world);
         if viewer.simulating() || picture.is_some() {
-            control::drive(scene, &mut stage, time, dt);
+            stage::drive(&file.scene, &mut stage, time, dt);
             stage.world.step(&mut stage.physics);
             time += dt;
         }

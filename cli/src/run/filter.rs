@@ -1,8 +1,8 @@
-//! The low-pass filter of impact tests: channel frequency classes [SAE J211], ISO 6487.
+//! The low-pass filter of impact tests: channel frequency classes [SAE 2014], ISO 6487.
 
 use std::f64::consts::{PI, SQRT_2};
 
-/// The filter's cut-off is this times its class [SAE J211, appendix C].
+/// The filter's cut-off is this times its class [SAE 2014, appendix C].
 const CUTOFF_PER_CLASS: f64 = 2.0775;
 
 /// Filters samples that are `dt` \[s\] apart: Butterworth of the second order forward and backward, so that nothing is late. The

@@ -5,7 +5,7 @@ use crate::scene::mistake::{Mistake, unknown};
 use crate::scene::{Expect, Quantity, Scene, Take};
 use toml::Spanned;
 
-/// Samples of a filter's signal per hertz of its class [SAE J211].
+/// Samples of a filter's signal per hertz of its class [SAE 2014].
 const SAMPLES_PER_CLASS: f64 = 10.0;
 
 pub(super) fn check_expectation(scene: &Scene, e: &Expect) -> Result<(), Mistake> {
