@@ -112,3 +112,43 @@ fn a_drop_begins_just_above_the_floor_with_the_speed_of_the_fall() {
         assert!((number(&start, "speed") - speed).abs() < 1e-3, "{down:?}");
     }
 }
+
+/// A cube hangs on a hook until it has been stretched by so much of its weight, and a box on a joint until a time.
+#[test]
+fn what_is_released_falls_from_then_on() {
+    let fallen = outcome(
+        r#"
+        world = { duration = 1.0, dt = 0.005 }
+        rigid = [
+            { name = "hook", kind = "fixed", shape = { cuboid = { half_extents = [0.1, 0.1, 0.1] } }, collides = false },
+            { name = "box", kind = "dynamic", shape = { ball = { radius = 0.1 } }, translation = [3, -1, 0], collides = false },
+        ]
+        joint = [{ between = ["hook", "box"], kind = { fixed = {} }, anchor = [0, 0, 0] }]
+        deformable = [
+            { name = "cube", body = { lattice = { half_extents = [0.1, 0.1, 0.1], cells = [2, 2, 2] } }, translation = [0, -0.2, 0],
+              material = { youngs_modulus = 1e6, poisson_ratio = 0.3 } },
+            { name = "sheet", body = { cloth = { half_extents = [0.1, 0.1], cells = [2, 2], thickness = 0.001 } }, translation = [0, -0.05, 2],
+              pinned = { min = [-1, -1, 1], max = [1, 1, 3] }, material = { youngs_modulus = 1e6, poisson_ratio = 0.3 } },
+        ]
+        attach = [{ deformable = "cube", to = "hook", region = { min = [-1, -0.11, -1], max = [1, 0, 1] } }]
+        trigger = [
+            { after = 0.3, when = { quantity = "speed", of = "hook", at_most = 0.0 }, release = ["cube", "sheet"] },
+            { when = { quantity = "y", of = "cube", at_most = -0.7 }, cut = [["box", "hook"]] },
+            { when = { quantity = "y", of = "cube", at_most = -100.0 }, release = ["cube"] },
+        ]
+        measure = [
+            { name = "held", quantity = "y", of = "cube", at = 0.3 },
+            { name = "speed", quantity = "velocity_y", of = "cube" },
+            { name = "sheet", quantity = "velocity_y", of = "sheet" },
+            { name = "box", quantity = "velocity_y", of = "box" },
+            { name = "box before", quantity = "velocity_y", of = "box", at = 0.6 },
+        ]
+        "#,
+    );
+    assert!((number(&fallen, "held") + 0.2).abs() < 1e-3);
+    assert!((number(&fallen, "speed") + 9.81 * 0.7).abs() < 0.05, "{}", number(&fallen, "speed"));
+    assert!((number(&fallen, "sheet") + 9.81 * 0.7).abs() < 0.05, "{}", number(&fallen, "sheet"));
+    // The cube is half a metre lower after √(2·0.5/g) = 0.319 s: at 0.619 s.
+    assert!((number(&fallen, "box") + 9.81 * (1.0 - 0.619)).abs() < 0.1, "{}", number(&fallen, "box"));
+    assert_eq!(number(&fallen, "box before"), 0.0);
+}

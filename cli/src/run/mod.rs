@@ -111,6 +111,7 @@ fn steps(
             replay.record(time, stage);
         }
         run.outcome.steps = step;
+        stage.pull_triggers(scene, time);
     }
     judge(scene, stage, &signals, curves, &mut run.outcome);
 }

@@ -9,6 +9,7 @@ mod mistake;
 mod rigid;
 mod schema;
 mod source;
+mod trigger;
 mod values;
 
 pub use control::{Attach, Move};
@@ -21,6 +22,7 @@ pub use expectation::{Curve, Expect, Holds, Probe, Quantity, Take};
 pub use mistake::SceneError;
 pub use rigid::{Joint, JointKind, Kind, Motor, Rigid, Shape, Switch};
 pub use schema::schema;
+pub use trigger::{MotorSwitch, Trigger, When};
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -60,6 +62,9 @@ pub struct Scene {
     /// How kinematic bodies move.
     #[serde(default, rename = "move")]
     pub moves: Vec<Move>,
+    /// What happens when.
+    #[serde(default)]
+    pub trigger: Vec<Trigger>,
     /// A package that falls.
     pub drop: Option<Drop>,
     /// Points that are watched.

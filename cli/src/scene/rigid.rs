@@ -152,6 +152,14 @@ pub struct Joint {
     pub motor: Option<Motor>,
 }
 
+impl Joint {
+    /// Whether it is between these two, in either order.
+    pub fn is_between(&self, one: &str, other: &str) -> bool {
+        let [first, second] = self.between.each_ref().map(|name| name.as_ref().as_str());
+        (first, second) == (one, other) || (first, second) == (other, one)
+    }
+}
+
 /// The axis is that of both bodies' frames.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]

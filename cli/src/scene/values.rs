@@ -59,7 +59,21 @@ const UNITS: [(&str, f64); 46] = [
 
 /// Keys whose strings name things, whatever they look like.
 pub fn is_name(key: &str) -> bool {
-    ["name", "of", "on", "minus", "between", "deformable", "to", "path", "column", "members"].contains(&key)
+    [
+        "name",
+        "of",
+        "on",
+        "minus",
+        "between",
+        "deformable",
+        "to",
+        "path",
+        "column",
+        "members",
+        "release",
+        "cut",
+    ]
+    .contains(&key)
 }
 
 /// A number with a unit; nothing if it is none.

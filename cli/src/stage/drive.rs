@@ -1,7 +1,7 @@
 //! What a scene does to its bodies while it runs: kinematic bodies that move, motors that turn round.
 
 use super::Stage;
-use crate::scene::Scene;
+use crate::scene::{Joint, Scene};
 use rapier3d::prelude::*;
 
 /// A joint with a motor.
@@ -24,25 +24,30 @@ pub fn drive(scene: &Scene, stage: &mut Stage, time: f32, dt: f32) {
             body.set_linvel(velocity, true);
         }
     }
-    let motors = scene.joint.iter().filter_map(|joint| Some((joint, joint.motor.as_ref()?)));
-    for ((joint, motor), made) in motors.zip(&stage.motors) {
+    for (joint, made) in scene.joint.iter().zip(stage.joints.clone()) {
+        let Some(motor) = &joint.motor else { continue };
         for switch in &motor.then {
             let at = *switch.at.as_ref();
             if !(time - 0.5 * dt..time + 0.5 * dt).contains(&at) {
                 continue;
             }
-            let data = match *made {
-                Motored::Joint(handle) => {
-                    stage.physics.impulse_joints.get_mut(handle, true).map(|j| &mut j.data)
-                }
-                Motored::Link(handle) => {
-                    let found = stage.physics.multibody_joints.get_mut(handle);
-                    found.and_then(|(multibody, link)| Some(&mut multibody.link_mut(link)?.joint.data))
-                }
-            };
-            if let (Some(data), Some(axis)) = (data, joint.kind.free_axis()) {
-                data.set_motor_velocity(axis, switch.velocity, motor.damping);
+            stage.set_motor(joint, made, switch.velocity);
+        }
+    }
+}
+
+impl Stage {
+    /// Gives the motor of a joint another velocity; one that has been cut has none.
+    pub(super) fn set_motor(&mut self, joint: &Joint, made: Motored, velocity: f32) {
+        let data = match made {
+            Motored::Joint(handle) => self.physics.impulse_joints.get_mut(handle, true).map(|j| &mut j.data),
+            Motored::Link(handle) => {
+                let found = self.physics.multibody_joints.get_mut(handle);
+                found.and_then(|(multibody, link)| Some(&mut multibody.link_mut(link)?.joint.data))
             }
+        };
+        if let (Some(data), Some(axis), Some(motor)) = (data, joint.kind.free_axis(), &joint.motor) {
+            data.set_motor_velocity(axis, velocity, motor.damping);
         }
     }
 }

@@ -39,9 +39,7 @@ impl Stage {
         } else {
             Motored::Joint(self.physics.impulse_joints.insert(first, second, data, true))
         };
-        if motor.is_some() {
-            self.motors.push(made);
-        }
+        self.joints.push(made);
         Ok(())
     }
 
@@ -55,9 +53,12 @@ impl Stage {
             body.model().surface_triangles().flatten().map(|v| v as usize).collect();
         let (min, max) = (Vector::from(attach.region.min), Vector::from(attach.region.max));
         let mut vertices = body.vertices_where(|x| x.cmpge(min).all() && x.cmple(max).all());
-        vertices.retain(|v| of_surface.contains(v));
+        // Sheets and ropes are surface all over.
+        vertices.retain(|v| of_surface.is_empty() || of_surface.contains(v));
         let to = AttachTo::RigidBody(*rigid, *self.physics.bodies[*rigid].position());
         let made = self.world.bodies.attach(*soft, &vertices, to);
-        made.map(|_| ()).map_err(|e| format!("attach: \"{name}\": {e}"))
+        let handle = made.map_err(|e| format!("attach: \"{name}\": {e}"))?;
+        self.attachments.push((name.clone(), handle));
+        Ok(())
     }
 }

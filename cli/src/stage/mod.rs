@@ -7,6 +7,7 @@ mod losses;
 mod measure;
 mod shapes;
 mod soft;
+mod triggers;
 
 pub use drive::{Motored, drive};
 pub(crate) use measure::size;
@@ -30,8 +31,12 @@ pub struct Stage {
     pub deformable: Vec<(String, DeformableBodyHandle)>,
     /// Watched vertices, in the order of the file.
     pub probes: Vec<(String, DeformableBodyHandle, usize)>,
-    /// Joints with a motor, in the order of the file.
-    pub motors: Vec<Motored>,
+    /// Joints, in the order of the file.
+    pub joints: Vec<Motored>,
+    /// Attachments, each with the deformable that it holds.
+    pub attachments: Vec<(String, DeformableAttachmentHandle)>,
+    /// Of the triggers, in the order of the file, whether they have happened.
+    happened: Vec<bool>,
     /// Where everything is at the start.
     start: BTreeMap<String, Start>,
     losses: losses::Losses,
@@ -60,7 +65,9 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
         rigid: Vec::new(),
         deformable: Vec::new(),
         probes: Vec::new(),
-        motors: Vec::new(),
+        joints: Vec::new(),
+        attachments: Vec::new(),
+        happened: vec![false; scene.trigger.len()],
         start: BTreeMap::new(),
         losses: losses::Losses::default(),
     };

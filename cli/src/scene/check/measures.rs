@@ -2,7 +2,8 @@
 
 use super::{deformable_names, rigid_names};
 use crate::scene::mistake::{Mistake, unknown};
-use crate::scene::{Expect, Quantity, Scene, Take};
+use crate::scene::{Expect, Quantity, Scene, Take, When};
+use std::ops::Range;
 use toml::Spanned;
 
 /// Samples of a filter's signal per hertz of its class [SAE 2014].
@@ -73,29 +74,51 @@ fn check_filter(scene: &Scene, e: &Expect) -> Result<(), Mistake> {
     Ok(())
 }
 
-/// Whether the thing has the quantity, and a force the body that it is on.
+/// The condition of a trigger.
+pub(super) fn check_when(scene: &Scene, when: &When, at: Range<usize>) -> Result<(), Mistake> {
+    check_quantity_of(scene, *when.quantity.as_ref(), when.quantity.span(), &[&when.of], when.on.as_ref())?;
+    if *when.quantity.as_ref() == Quantity::AccelerationG {
+        return Err((
+            at,
+            "`when`: an acceleration is known after the run only; take a `speed` or a `force`".into(),
+        ));
+    }
+    if when.at_most.is_none() && when.at_least.is_none() {
+        return Err((at, "`when` needs `at_most` or `at_least`".into()));
+    }
+    Ok(())
+}
+
 fn check_what_is_measured(scene: &Scene, e: &Expect) -> Result<(), Mistake> {
+    let of: Vec<&Spanned<String>> = [Some(&e.of), e.minus.as_ref()].into_iter().flatten().collect();
+    check_quantity_of(scene, *e.quantity.as_ref(), e.quantity.span(), &of, e.on.as_ref())
+}
+
+/// Whether things have the quantity, and a force the body that it is on. The second of the things is taken off.
+fn check_quantity_of(
+    scene: &Scene,
+    quantity: Quantity,
+    at: Range<usize>,
+    of: &[&Spanned<String>],
+    on: Option<&Spanned<String>>,
+) -> Result<(), Mistake> {
     let all: Vec<&str> = scene.names().collect();
-    let quantity = *e.quantity.as_ref();
-    for name in [Some(&e.of), e.minus.as_ref()].into_iter().flatten() {
+    for (name, key) in of.iter().zip(["of", "minus"]) {
         let text = name.as_ref().as_str();
         if text == "all" && quantity.is_energy() {
             continue;
         }
         if !all.contains(&text) {
-            let key = if std::ptr::eq(name, &e.of) { "of" } else { "minus" };
             return Err(unknown(name, key, "a body or probe", &all));
         }
         check_quantity(scene, name, quantity)?;
     }
     let bodies: Vec<&str> = rigid_names(scene).into_iter().chain(deformable_names(scene)).collect();
-    match &e.on {
+    match on {
         Some(on) if quantity.is_force() && !bodies.contains(&on.as_ref().as_str()) => {
             Err(unknown(on, "on", "a body", &bodies))
         }
-        None if quantity.is_force() => {
-            Err((e.quantity.span(), "`force` needs `on`, the body that touches".into()))
-        }
+        None if quantity.is_force() => Err((at, "`force` needs `on`, the body that touches".into())),
         Some(on) if !quantity.is_force() => Err((on.span(), "`on` is for the quantity `force` only".into())),
         _ => Ok(()),
     }

@@ -4,8 +4,8 @@ mod measures;
 mod shapes;
 
 use super::mistake::{Mistake, unknown};
-use super::{Drop, Joint, JointKind, Kind, Rigid, Scene};
-use measures::{check_expectation, check_measure};
+use super::{Drop, Joint, JointKind, Kind, Rigid, Scene, Trigger};
+use measures::{check_expectation, check_measure, check_when};
 use shapes::{body_problem, shape_problem};
 use toml::Spanned;
 
@@ -25,6 +25,7 @@ pub fn check(scene: &Scene) -> Result<(), Mistake> {
     scene.rigid.iter().try_for_each(check_mass)?;
     scene.joint.iter().try_for_each(|joint| check_joint(scene, joint))?;
     check_control(scene)?;
+    scene.trigger.iter().try_for_each(|trigger| check_trigger(scene, trigger))?;
     check_bodies(scene)?;
     check_probes(scene)?;
     scene.drop.as_ref().map_or(Ok(()), |drop| check_drop(scene, drop))?;
@@ -176,6 +177,47 @@ fn check_control(scene: &Scene) -> Result<(), Mistake> {
         }
     }
     Ok(())
+}
+
+fn check_trigger(scene: &Scene, trigger: &Trigger) -> Result<(), Mistake> {
+    let (rigid, soft) = (rigid_names(scene), deformable_names(scene));
+    if let Some(wrong) = trigger.release.iter().find(|name| !soft.contains(&name.as_ref().as_str())) {
+        return Err(unknown(wrong, "release", "a deformable", &soft));
+    }
+    let has_joint = |pair: &[Spanned<String>; 2], with_motor: bool| {
+        let joints = scene.joint.iter().filter(|joint| !with_motor || joint.motor.is_some());
+        joints.into_iter().any(|joint| joint.is_between(pair[0].as_ref(), pair[1].as_ref()))
+    };
+    for (key, pair) in
+        trigger.cut.iter().map(|p| ("cut", p)).chain(trigger.switch.iter().map(|s| ("switch", &s.between)))
+    {
+        if let Some(wrong) = pair.iter().find(|name| !rigid.contains(&name.as_ref().as_str())) {
+            return Err(unknown(wrong, key, "a rigid body", &rigid));
+        }
+        if !has_joint(pair, key == "switch") {
+            let what = if key == "switch" { "joint with a motor" } else { "joint" };
+            let message = format!(
+                "`{key}`: there is no {what} between \"{}\" and \"{}\"",
+                pair[0].as_ref(),
+                pair[1].as_ref()
+            );
+            return Err((pair[0].span(), message));
+        }
+    }
+    if let Some(when) = &trigger.when {
+        check_when(scene, when.as_ref(), when.span())?;
+    }
+    match trigger.after.as_ref().map(|after| (*after.as_ref(), after.span())) {
+        Some((after, span)) if !(after >= 0.0) => {
+            Err((span, format!("`after` is {after} s, but must not be negative")))
+        }
+        None if trigger.when.is_none() => {
+            let place = trigger.release.first().or(trigger.cut.first().map(|pair| &pair[0]));
+            let span = place.or(trigger.switch.first().map(|s| &s.between[0])).map_or(0..0, Spanned::span);
+            Err((span, "a trigger needs `after`, a time, or `when`, a condition".into()))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Shapes of rigid bodies; shapes and materials of deformable ones.
