@@ -21,7 +21,9 @@ fn main() {
     let all = jobs(Path::new(SCENE), cases(file.scene.sweep.as_ref().unwrap()).unwrap(), &[], &out).unwrap();
     let seconds = |count: usize| {
         let start = Instant::now();
-        let done = run_jobs(&all, &JobOptions { jobs: count, ..JobOptions::default() }).unwrap();
+        let done =
+            run_jobs(&all, &JobOptions { jobs: count, replay_rate: Some(0.0), ..JobOptions::default() })
+                .unwrap();
         assert_eq!((done.len(), done.iter().map(|d| d.outcome.failures()).sum::<usize>()), (all.len(), 0));
         start.elapsed().as_secs_f64()
     };

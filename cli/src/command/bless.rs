@@ -38,6 +38,7 @@ impl Bless {
         let all = all_cases(path)?;
         let options = JobOptions {
             jobs: self.jobs.unwrap_or_else(threads),
+            replay_rate: Some(0.0),
             stop: Some(stop_flag()),
             ..JobOptions::default()
         };

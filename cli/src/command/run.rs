@@ -33,9 +33,9 @@ pub(super) struct Run {
     /// Also writes JUnit's XML.
     #[arg(long)]
     junit: Option<PathBuf>,
-    /// Pictures per second of the replay; 0 for none.
-    #[arg(long, default_value_t = 60.0)]
-    replay_rate: f64,
+    /// Pictures per second of the replay, 0 for none; 60 if not given, and more of scenes that are short.
+    #[arg(long)]
+    replay_rate: Option<f64>,
     /// Takes no notice of baselines.
     #[arg(long)]
     no_baseline: bool,
@@ -90,7 +90,7 @@ impl Run {
         };
         let options = JobOptions {
             jobs: self.jobs,
-            replay_rate: self.replay_rate.max(0.0),
+            replay_rate: self.replay_rate,
             stop: Some(stop_flag()),
             progress: Some(&progress),
             ..JobOptions::default()

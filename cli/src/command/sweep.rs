@@ -101,7 +101,7 @@ impl Sweep {
         let finished = |_: &Done| bar.inc(1);
         let options = JobOptions {
             jobs: self.jobs.unwrap_or_else(threads),
-            replay_rate: self.replay_rate.max(0.0),
+            replay_rate: Some(self.replay_rate),
             resume: !self.fresh,
             stop: Some(stop_flag()),
             finished: Some(&finished),

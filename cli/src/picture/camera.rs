@@ -12,6 +12,8 @@ pub(super) struct Camera {
     right: Vector,
     up: Vector,
     forward: Vector,
+    /// What is nearer is not seen.
+    near: f32,
 }
 
 impl Camera {
@@ -21,18 +23,34 @@ impl Camera {
         let radius = whole.half_extents().length().max(1e-6);
         let forward = -back;
         let right = forward.cross(Vector::Y).normalize_or(Vector::X);
-        Self {
-            eye: whole.center() + back * (radius * (1.0 + HALF_VIEW * HALF_VIEW).sqrt() / HALF_VIEW),
-            right,
-            up: right.cross(forward),
-            forward,
-        }
+        let distance = radius * (1.0 + HALF_VIEW * HALF_VIEW).sqrt() / HALF_VIEW;
+        let (eye, up) = (whole.center() + back * distance, right.cross(forward));
+        Self { eye, right, up, forward, near: 0.01 * distance }
     }
 
-    /// Along the picture from −1 to 1 (of the height), up, and the distance; the last is negative behind the eye.
-    pub fn seen(&self, point: Vector) -> [f32; 3] {
+    /// Along the picture, up, and the distance \[m\]; the last is negative behind the eye.
+    pub fn frame(&self, point: Vector) -> Vector {
         let from = point - self.eye;
-        let depth = from.dot(self.forward);
-        [from.dot(self.right) / (depth * HALF_VIEW), from.dot(self.up) / (depth * HALF_VIEW), depth]
+        Vector::new(from.dot(self.right), from.dot(self.up), from.dot(self.forward))
+    }
+
+    /// A point of that frame in the picture, from −1 to 1 (of the height), and its distance.
+    pub fn projected(point: Vector) -> [f32; 3] {
+        [point.x / (point.z * HALF_VIEW), point.y / (point.z * HALF_VIEW), point.z]
+    }
+
+    /// The part of a triangle of that frame that is before the eye: none, three or four corners in order.
+    pub fn before_the_eye(&self, triangle: [Vector; 3]) -> Vec<Vector> {
+        let mut kept = Vec::with_capacity(4);
+        for (k, a) in triangle.into_iter().enumerate() {
+            let b = triangle[(k + 1) % 3];
+            if a.z >= self.near {
+                kept.push(a);
+            }
+            if (a.z >= self.near) != (b.z >= self.near) {
+                kept.push(a + (b - a) * ((self.near - a.z) / (b.z - a.z)));
+            }
+        }
+        kept
     }
 }

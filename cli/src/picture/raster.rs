@@ -19,16 +19,22 @@ impl Raster {
         Self { width, height, colors: vec![background; width * height], nearness: vec![0.0; width * height] }
     }
 
-    /// Draws a triangle, lit on both sides; one that reaches behind the eye is left out.
+    /// Draws a triangle, lit on both sides.
     pub fn triangle(&mut self, camera: &Camera, corners: [Vector; 3], color: [f32; 3]) {
-        let seen = corners.map(|corner| camera.seen(corner));
-        if seen.iter().any(|s| !(s[2] > 0.0) || s.iter().any(|c| !c.is_finite())) {
+        if corners.iter().any(|corner| !corner.is_finite()) {
             return;
         }
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
         let toward = if normal.dot(camera.eye - corners[0]) < 0.0 { -normal } else { normal };
         let light = 0.42 + 0.58 * toward.dot(TO_LIGHT).max(0.0);
         let color = color.map(|c| c * light);
+        let seen = camera.before_the_eye(corners.map(|corner| camera.frame(corner)));
+        for k in 1..seen.len().saturating_sub(1) {
+            self.fill([seen[0], seen[k], seen[k + 1]].map(Camera::projected), color);
+        }
+    }
+
+    fn fill(&mut self, seen: [[f32; 3]; 3], color: [f32; 3]) {
         let half = self.height as f32 * 0.5;
         let [a, b, c] = seen.map(|[x, y, _]| [self.width as f32 * 0.5 + x * half, half - y * half]);
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);

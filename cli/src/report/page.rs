@@ -1,8 +1,8 @@
 //! One page of a run, whole in one file: verdicts, plots, and the replay in 3D.
 
 use super::plot::{Line, lines};
-use super::text::number;
 use crate::baseline::Drift;
+use crate::run::number;
 use crate::run::{Costs, Measured, Outcome, Trace};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -94,7 +94,7 @@ fn add_verdicts(body: &mut String, outcome: &Outcome) {
     if outcome.verdicts.is_empty() {
         return;
     }
-    body.push_str("<h2>Expectations</h2>\n<table class=\"sorts\">\n<thead><tr><th>verdict</th><th>number</th><th>value</th><th>wanted</th></tr></thead>\n<tbody>\n");
+    body.push_str("<h2>Expectations</h2>\n<table class=\"sorts\">\n<thead><tr><th>verdict</th><th>number</th><th class=\"number\">value</th><th>wanted</th></tr></thead>\n<tbody>\n");
     for verdict in &outcome.verdicts {
         let (class, word) = if verdict.met { ("ok", "met") } else { ("failed", "failed") };
         let _ = writeln!(
@@ -122,7 +122,7 @@ fn add_numbers(body: &mut String, title: &str, numbers: &[Measured]) {
     }
     let _ = writeln!(
         body,
-        "<h2>{title}</h2>\n<table class=\"sorts\">\n<thead><tr><th>number</th><th>value</th></tr></thead>\n<tbody>"
+        "<h2>{title}</h2>\n<table class=\"sorts\">\n<thead><tr><th>number</th><th class=\"number\">value</th></tr></thead>\n<tbody>"
     );
     for measured in numbers {
         let _ = writeln!(

@@ -217,6 +217,9 @@
     if (wanted) { draw(time); wanted = false; }
     requestAnimationFrame(tick);
   };
+  // Short scenes begin in slow motion: they last a second at least.
+  const slow = [...by("speed").options].map((option) => Number(option.value)).find((speed) => end / speed >= 1);
+  by("speed").value = String(slow || 0.01);
   // A time to begin at: page.html#t=1.5
   const asked = Number((location.hash.match(/t=([\d.]+)/) || [])[1]);
   if (asked > 0) time = Math.min(asked, end);

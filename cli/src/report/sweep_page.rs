@@ -1,7 +1,7 @@
 //! One page of a sweep: every case in a table, each number over all cases, and how they go together.
 
 use super::page::{escaped, number_cell, page};
-use super::text::number;
+use crate::run::number;
 use crate::sweep::{Row, Table};
 use std::fmt::Write as _;
 
@@ -23,7 +23,7 @@ pub fn page_of_sweep(title: &str, table: &Table, folders: &[String]) -> String {
 }
 
 fn add_summaries(body: &mut String, table: &Table) {
-    body.push_str("<h2>Over all cases</h2>\n<div class=\"wide\"><table class=\"sorts\">\n<thead><tr><th>number</th><th>mean</th><th>deviation</th><th>least</th><th>in</th><th>largest</th><th>in</th></tr></thead>\n<tbody>\n");
+    body.push_str("<h2>Over all cases</h2>\n<div class=\"wide\"><table class=\"sorts\">\n<thead><tr><th>number</th><th class=\"number\">mean</th><th class=\"number\">deviation</th><th class=\"number\">least</th><th>in</th><th class=\"number\">largest</th><th>in</th></tr></thead>\n<tbody>\n");
     for s in table.summaries() {
         let _ = writeln!(
             body,
@@ -43,9 +43,9 @@ fn add_summaries(body: &mut String, table: &Table) {
 fn add_cases(body: &mut String, table: &Table, folders: &[String]) {
     body.push_str("<h2>Cases</h2>\n<div class=\"wide\"><table class=\"sorts\">\n<thead><tr><th>case</th>");
     for name in table.names.iter().skip(table.set) {
-        let _ = write!(body, "<th>{}</th>", escaped(name));
+        let _ = write!(body, "<th class=\"number\">{}</th>", escaped(name));
     }
-    body.push_str("<th>failures</th><th>results</th></tr></thead>\n<tbody>\n");
+    body.push_str("<th class=\"number\">failures</th><th>results</th></tr></thead>\n<tbody>\n");
     for (k, row) in table.rows.iter().enumerate() {
         let class = if row.failures > 0 { " class=\"failed\"" } else { "" };
         let _ = write!(body, "<tr><td{class}>{}</td>", escaped(&row.case));

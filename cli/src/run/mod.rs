@@ -2,6 +2,7 @@
 
 mod digest;
 mod filter;
+mod number;
 mod outcome;
 mod packed;
 mod recorded;
@@ -11,8 +12,9 @@ mod trace;
 
 pub use digest::key;
 pub use filter::channel_filter;
+pub use number::number;
 pub use outcome::{Costs, Measured, Outcome, Verdict};
-pub use replay::{Replay, ReplayFrame, ReplayMesh};
+pub use replay::{Replay, ReplayFrame, ReplayMesh, replay_rate};
 pub use trace::Trace;
 
 use crate::scene::{Expect, Kind, Quantity, Scene, SceneFile};

@@ -1,5 +1,6 @@
 //! What a run comes to: numbers and verdicts, the same bits for the same scene.
 
+use super::number::number;
 use crate::scene::{Expect, Quantity};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -93,7 +94,7 @@ impl Verdict {
         let wanted =
             [("equals", e.equals), ("at most", e.at_most), ("at least", e.at_least), ("within", e.within)];
         let mut wanted: Vec<String> =
-            wanted.iter().filter_map(|(name, v)| v.map(|v| format!("{name} {v}"))).collect();
+            wanted.iter().filter_map(|(name, v)| v.map(|v| format!("{name} {}", number(v, "")))).collect();
         if let Some(holds) = e.holds {
             wanted.insert(0, format!("{holds:?}").to_lowercase());
         }

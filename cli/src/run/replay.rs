@@ -9,6 +9,16 @@ use serde::Serialize;
 /// Triangles of a half-space reach so far from its middle, in sizes of the rest of the scene.
 const HALF_SPACE_REACH: f32 = 2.0;
 
+/// Pictures per second, and at least so many in all: a fall of 30 ms is looked at in slow motion.
+const RATE: f64 = 60.0;
+const LEAST_PICTURES: f64 = 120.0;
+
+/// Pictures per second that show a scene well, no more than it has steps.
+pub fn replay_rate(scene: &Scene) -> f64 {
+    let (steps, dt) = scene.steps();
+    RATE.max(LEAST_PICTURES / (steps as f64 * dt).max(dt)).min(1.0 / dt)
+}
+
 /// A mesh of a replay.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReplayMesh {

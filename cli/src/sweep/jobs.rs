@@ -1,7 +1,7 @@
 //! Cases run side by side, each into a folder of its own; those that are there already are not run again.
 
 use super::cases::Case;
-use crate::run::{Costs, Outcome, Run, RunOptions, key, run};
+use crate::run::{Costs, Outcome, Run, RunOptions, key, replay_rate, run};
 use crate::scene::{SceneError, SceneFile};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -41,8 +41,8 @@ pub struct Done {
 pub struct JobOptions<'a> {
     /// Side by side; one if zero.
     pub jobs: usize,
-    /// Pictures per second of replays; none if zero.
-    pub replay_rate: f64,
+    /// Pictures per second of replays, none if zero; [`replay_rate`] of each scene if not given.
+    pub replay_rate: Option<f64>,
     /// Whether results that are there already and are of the same scene count.
     pub resume: bool,
     /// Set to stop; what is finished stays whole.
@@ -129,7 +129,8 @@ fn finish(job: &Job, number: usize, options: &JobOptions<'_>) -> Option<Result<D
         }
         !options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     };
-    let run_options = RunOptions { replay_rate: options.replay_rate, progress: Some(&progress) };
+    let rate = options.replay_rate.unwrap_or_else(|| replay_rate(&job.file.scene)).max(0.0);
+    let run_options = RunOptions { replay_rate: rate, progress: Some(&progress) };
     // One case that breaks is not to end the others.
     let mut run = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run(&job.file, &run_options)))
         .unwrap_or_else(|panic| broken(job, &*panic));
