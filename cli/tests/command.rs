@@ -109,3 +109,51 @@ fn pictures_and_films_are_written() {
     }
     assert_eq!(frames, 6);
 }
+
+/// Scenes without soft bodies, with names that are no file names, twice the same, and results that cannot be written.
+#[test]
+fn odd_scenes_and_places() {
+    let folder = folder("odd");
+    let ball = |name: &str| {
+        format!(
+            "world = {{ duration = 0.1 }}\nrigid = [{{ name = {name:?}, kind = \"dynamic\", shape = {{ ball = {{ radius = 0.1 }} }} }}]\n\
+            measure = [{{ quantity = \"y\", of = {name:?} }}]\nsweep = {{ over = {{ \"world.dt\" = [0.01, 0.01] }} }}\n"
+        )
+    };
+    std::fs::write(folder.join("sp ace ü.toml"), ball("a \"q\" <b>/ü")).unwrap();
+    let said = foible_exits(&folder, &["run", "sp ace ü.toml", "--junit", "a.xml"], 0);
+    assert!(said.contains("y of a \"q\" <b>/ü: -0.0"), "{said}");
+    let page = std::fs::read_to_string(folder.join("target/scenes/sp ace ü/index.html")).unwrap();
+    assert!(page.contains("a &quot;q&quot; &lt;b&gt;/ü") && !page.contains("<b>"));
+    foible_exits(&folder, &["sweep", "sp ace ü.toml", "--jobs", "0"], 0);
+    let cases = std::fs::read_to_string(folder.join("target/sweeps/sp ace ü/cases.csv")).unwrap();
+    assert!(cases.contains("dt=0.01 #2,"), "{cases}");
+    let said = foible_exits(&folder, &["run", "sp ace ü.toml", "./sp ace ü.toml"], 2);
+    assert!(said.contains("the same name"), "{said}");
+    std::fs::write(folder.join("file"), "").unwrap();
+    let said = foible_exits(&folder, &["run", "sp ace ü.toml", "--out", "file"], 2);
+    assert!(said.starts_with("error: file"), "{said}");
+}
+
+/// The first Ctrl-C ends a sweep with what is finished whole.
+#[test]
+#[cfg(unix)]
+fn an_interrupt_keeps_what_is_finished() {
+    let folder = folder("interrupted");
+    let scene = format!("{SCENES}/transit_drop.toml");
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_foible"));
+    command.current_dir(&folder).args(["sweep", &scene, "--jobs", "1", "--out", "out"]);
+    let child =
+        command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    while !folder.join("out/0001/outcome.json").exists() {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let killed = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("of 104 cases, 0 of them were there already, 0 failed"), "{said}");
+    let rows = std::fs::read_to_string(folder.join("out/cases.csv")).unwrap().lines().count();
+    assert!((3..100).contains(&rows), "{rows}");
+}

@@ -48,8 +48,9 @@ fn shipped_scenes_parse() {
 }
 
 /// What of the good file is replaced by what; the line; what the answer has to say.
-const WRONG: [(&str, &str, usize, &[&str]); 27] = [
+const WRONG: [(&str, &str, usize, &[&str]); 28] = [
     ("duration = 1.0", "duration = -1.0", 2, &["duration", "positive"]),
+    ("duration = 1.0", "duration = 0.001", 2, &["duration", "step"]),
     (
         "[[probe]]",
         "[[joint]]\nbetween = [\"floor\", \"bar\"]\nkind = { fixed = {} }\nanchor = [0.0, 0.0, 0.0]\n[[probe]]",
@@ -159,6 +160,7 @@ fn formulas_units_and_includes_are_read() {
         ("world.duration", "2 s"),
         ("rigid.floor.kind", "dynamic"),
         ("rigid.0.mass", "3"),
+        ("rigid.floor.linvel", "[0, \"36 km/h\", \"=wide\"]"),
     ])
     .unwrap();
     assert_eq!((half_extents(&set), set.scene.rigid[0].kind), ([3.0, 0.15, 3.0], file::Kind::Dynamic));
@@ -166,6 +168,7 @@ fn formulas_units_and_includes_are_read() {
         (*set.scene.world.duration.as_ref(), *set.scene.rigid[0].mass.as_ref().unwrap().as_ref()),
         (2.0, 3.0)
     );
+    assert_eq!(set.scene.rigid[0].linvel, [0.0, 10.0, 3.0]);
     // A mistake in an included file is told with that file.
     write(
         "_floor.toml",

@@ -117,7 +117,16 @@ pub(super) fn jobs(files: &[PathBuf], set: &[(String, String)], out: &Path) -> R
         let case = Case { name: String::new(), set: set.to_vec() };
         Ok(Job { file, case, folder: out.join(name_of(path)) })
     };
-    files.iter().map(job).collect()
+    let jobs: Vec<Job> = files.iter().map(job).collect::<Result<_, String>>()?;
+    for (k, job) in jobs.iter().enumerate() {
+        if let Some(other) = jobs[..k].iter().position(|other| other.folder == job.folder) {
+            let [one, other] = [k, other].map(|k| files[k].display());
+            return Err(format!(
+                "{other} and {one} have the same name: their results would be in one folder"
+            ));
+        }
+    }
+    Ok(jobs)
 }
 
 /// The page and the plot of a run, from what is in its folder.

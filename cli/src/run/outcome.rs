@@ -140,7 +140,7 @@ impl Costs {
     /// Of milliseconds per step.
     pub fn of(mut steps: Vec<f64>) -> Self {
         steps.sort_by(f64::total_cmp);
-        let total: f64 = steps.iter().sum();
+        let total = steps.iter().fold(0.0, |sum, ms| sum + ms);
         let at =
             |part: f64| steps.get(((steps.len() as f64 * part) as usize).min(steps.len().saturating_sub(1)));
         let at = |part: f64| at(part).copied().unwrap_or(0.0);

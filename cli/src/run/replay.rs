@@ -123,8 +123,10 @@ impl Replay {
 
     /// Half the size of all that is not without end.
     fn reach(&self, stage: &Stage) -> f32 {
-        let soft = self.meshes.iter().flat_map(|mesh| &mesh.vertices).map(|v| Vector::from(*v));
-        let mut whole = Aabb::from_points(soft);
+        let mut whole = Aabb::new_invalid();
+        for vertex in self.meshes.iter().flat_map(|mesh| &mesh.vertices) {
+            whole.take_point(Vector::from(*vertex));
+        }
         for (_, _, collider) in &stage.rigid {
             let aabb = stage.physics.colliders[*collider].compute_aabb();
             if aabb.half_extents().max_element() < 1.0e4 {

@@ -130,8 +130,7 @@ impl Source {
         for (path, value) in paths {
             let said = |what| SceneError::of_set(path, what);
             let place = values::place_of(table.get_ref(), &whole, path).map_err(said)?;
-            let value = value.trim_matches('"');
-            let value = values.replacement(value).map_err(said)?.unwrap_or_else(|| values::literal(value));
+            let value = values.literal(value).map_err(said)?;
             let text = format!("{}{value}{}", place.before, place.after);
             edits.push(Edit { at: place.at, text, set: Some(path.clone()) });
         }
@@ -232,7 +231,7 @@ impl Source {
         let before: String = found.quoted.chars().take(found.column.saturating_sub(1)).collect();
         let before = before.rsplit(['\n', '{', ',']).next().unwrap_or_default().trim().to_string();
         let key: String = before.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-        if !key.is_empty() && !found.what.contains(&key) {
+        if !key.is_empty() && !found.what.contains(&key) && !found.what.starts_with("--set") {
             found.what = format!("`{key}`: {}", found.what);
         }
         if let Some(nearest) = super::mistake::nearest_in(&found.what) {

@@ -233,6 +233,19 @@ impl Resolved {
         }
     }
 
+    /// A value of a command line as TOML, units and formulas resolved, in lists too.
+    pub fn literal(&self, text: &str) -> Result<String, String> {
+        if let Ok(list) = DeValue::parse(text)
+            && let Some(values) = list.get_ref().as_array()
+        {
+            let value = |value: &Spanned<DeValue<'_>>| self.literal(&text[value.span()]);
+            let values: Vec<String> = values.iter().map(value).collect::<Result<_, _>>()?;
+            return Ok(format!("[{}]", values.join(", ")));
+        }
+        let bare = text.trim_matches('"');
+        Ok(self.replacement(bare)?.unwrap_or_else(|| literal(text)))
+    }
+
     /// What stands for a string of the scene; nothing if it stands for itself.
     pub fn replacement(&self, text: &str) -> Result<Option<String>, String> {
         if let Some(text) = text.strip_prefix('=') {

@@ -41,9 +41,13 @@ fn check_size(scene: &Scene) -> Result<(), Mistake> {
         let message = format!("`duration` is {steps:.0} steps of {dt} s, but {MOST_STEPS:.0} are the most");
         return Err((duration.span(), message));
     }
+    if steps < 0.5 {
+        let message = format!("`duration` is {} s, which is no step of {dt} s", duration.as_ref());
+        return Err((duration.span(), message));
+    }
     let lists =
         [scene.rigid.len(), scene.deformable.len(), scene.joint.len(), scene.attach.len(), scene.moves.len()];
-    let watched = [scene.probe.len(), scene.measure.len(), scene.expect.len()];
+    let watched = [scene.trigger.len(), scene.probe.len(), scene.measure.len(), scene.expect.len()];
     if lists.into_iter().chain(watched).any(|entries| entries > MOST_ENTRIES) {
         return Err((
             duration.span(),
