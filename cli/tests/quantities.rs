@@ -152,3 +152,44 @@ fn what_is_released_falls_from_then_on() {
     assert!((number(&fallen, "box") + 9.81 * (1.0 - 0.619)).abs() < 0.1, "{}", number(&fallen, "box"));
     assert_eq!(number(&fallen, "box before"), 0.0);
 }
+
+/// A column of a soft and a stiff half under its load, and a recorded curve that it follows.
+#[test]
+fn regions_and_recorded_curves() {
+    let folder = common::folder("curves");
+    let text = |curve: &str| {
+        format!(
+            r#"
+            world = {{ duration = 2.0, dt = 0.01 }}
+            rigid = [
+                {{ name = "floor", kind = "fixed", shape = {{ cuboid = {{ half_extents = [1, 0.1, 1] }} }}, translation = [0, -0.1, 0] }},
+                {{ name = "load", kind = "dynamic", shape = {{ cuboid = {{ half_extents = [0.1, 0.1, 0.1] }} }}, mass = 4, translation = [0, 0.3, 0] }},
+            ]
+            deformable = [{{ name = "column", body = {{ lattice = {{ half_extents = [0.05, 0.1, 0.05], cells = [2, 4, 2] }} }}, translation = [0, 0.1, 0],
+                material = {{ youngs_modulus = 1e5, poisson_ratio = 0, density = 1 }},
+                regions = [{{ box = {{ min = [-1, 0, -1], max = [1, 1, 1] }}, material = {{ youngs_modulus = "1 MPa", poisson_ratio = 0, density = 1 }} }}] }}]
+            measure = [{{ name = "sag", quantity = "y", of = "load" }}]
+            {curve}
+            "#
+        )
+    };
+    let plain = outcome(&text(""));
+    let sag = 4.0 * 9.81 / 0.01 * (0.1 / 1e5 + 0.1 / 1e6);
+    assert!((0.3 - number(&plain, "sag") - sag).abs() < 2e-5, "{} {sag}", 0.3 - number(&plain, "sag"));
+    let all = run(&common::scene(&text("")), &RunOptions::default());
+    all.trace.write_csv(&folder.join("recorded.csv")).unwrap();
+    let judged = |within: f64, column: &str, height: f64| {
+        let text = text(&format!(
+            "expect = [{{ quantity = \"y\", of = \"load\", curve = {{ path = \"recorded.csv\", column = \"{column}\" }}, within = {within} }}]"
+        ));
+        let mut file = common::scene(&text.replace("mass = 4", &format!("mass = {height}")));
+        file.folder = folder.clone();
+        run(&file, &RunOptions::default()).outcome
+    };
+    assert!(judged(1e-8, "load.y", 4.0).verdicts[0].met, "a run follows itself");
+    // Half a kilogram more sinks by an eighth of the sag more.
+    let off = &judged(1e-3, "load.y", 4.5).verdicts[0];
+    assert!(off.met == (off.measured.value <= 1e-3) && off.measured.value > sag / 8.0 - 1e-5, "{off:?}");
+    let wrong = judged(1e-8, "load.z", 4.0).error.unwrap();
+    assert!(wrong.contains("no column \"load.z\"") && wrong.contains("load.y"), "{wrong}");
+}

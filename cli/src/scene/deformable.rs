@@ -35,6 +35,10 @@ pub struct Deformable {
     /// Whether it collides with itself.
     #[serde(default)]
     pub self_contact: bool,
+    /// Parts of another material: boxes of the body's own frame, later ones over earlier ones, or groups of a mesh file.
+    #[serde(default)]
+    #[schemars(with = "Vec<RegionMaterial>")]
+    pub regions: Vec<Spanned<RegionMaterial>>,
     /// How it is solved.
     #[serde(default)]
     pub solver: Solver,
@@ -97,6 +101,19 @@ pub enum Body {
         /// Along x, y and z.
         cells: [usize; 3],
     },
+}
+
+/// A part of a soft body with a material of its own.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RegionMaterial {
+    /// Elements whose middle is in this box, before the body is placed \[m\].
+    #[serde(rename = "box")]
+    pub within: Option<Region>,
+    /// Elements of this physical group of a Gmsh file.
+    pub group: Option<String>,
+    /// What it is made of.
+    pub material: Material,
 }
 
 /// What a soft body is made of.

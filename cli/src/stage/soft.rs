@@ -28,8 +28,8 @@ fn polyline(points: &[[f32; 3]], segments: usize) -> Vec<Vector> {
 }
 
 /// The shape of a deformable.
-fn mesh(body: &Body, folder: &Path) -> Result<DeformableBodyBuilder, String> {
-    Ok(match body {
+fn mesh(body: &scene::Deformable, folder: &Path) -> Result<DeformableBodyBuilder, String> {
+    Ok(match body.body.as_ref() {
         Body::Lattice { half_extents, cells } => {
             DeformableBodyBuilder::cuboid((*half_extents).into(), *cells)
         }
@@ -39,7 +39,8 @@ fn mesh(body: &Body, folder: &Path) -> Result<DeformableBodyBuilder, String> {
         ),
         Body::Mesh { path, cell_size, scale, z_up } => {
             let tets = tetrahedra(&folder.join(path), *cell_size, *scale, *z_up)?;
-            DeformableBodyBuilder::mesh(&tets)
+            let builder = DeformableBodyBuilder::mesh(&tets);
+            return with_groups(builder, &tets, &body.regions);
         }
         Body::Cloth { half_extents, cells, thickness } => {
             DeformableBodyBuilder::cloth(*half_extents, *cells, *thickness)
@@ -51,6 +52,38 @@ fn mesh(body: &Body, folder: &Path) -> Result<DeformableBodyBuilder, String> {
             let mesh = TetMesh::cuboid(half_extents.map(f64::from), *cells).map_err(|e| e.to_string())?;
             DeformableBodyBuilder::spring_network(&mesh)
         }
+    })
+}
+
+type Regions = [toml::Spanned<scene::RegionMaterial>];
+
+/// Materials of the physical groups of a file.
+fn with_groups(
+    builder: DeformableBodyBuilder,
+    mesh: &TetMesh,
+    regions: &Regions,
+) -> Result<DeformableBodyBuilder, String> {
+    regions.iter().map(toml::Spanned::as_ref).try_fold(builder, |builder, region| {
+        let Some(group) = &region.group else { return Ok(builder) };
+        let number = mesh.region_named(group).ok_or_else(|| format!("its mesh has no group \"{group}\""))?;
+        Ok(builder.region_material(number, region.material.to_material()))
+    })
+}
+
+/// Materials of boxes; later ones over earlier ones. Region 0 is what is in none.
+fn with_boxes(builder: DeformableBodyBuilder, regions: &Regions) -> DeformableBodyBuilder {
+    let boxes: Vec<scene::Region> = regions.iter().filter_map(|region| region.as_ref().within).collect();
+    if boxes.is_empty() {
+        return builder;
+    }
+    let builder = builder.regions(|x| {
+        let within =
+            |r: &scene::Region| (0..3).all(|k| (f64::from(r.min[k])..=f64::from(r.max[k])).contains(&x[k]));
+        boxes.iter().rposition(within).map_or(0, |k| k as u32 + 1)
+    });
+    let numbered = regions.iter().enumerate();
+    numbered.fold(builder, |builder, (k, region)| {
+        builder.region_material(k as u32 + 1, region.as_ref().material.to_material())
     })
 }
 
@@ -120,7 +153,7 @@ fn solved_by(builder: DeformableBodyBuilder, asked: &scene::Solver) -> Deformabl
 
 /// A body as its file describes it.
 pub(super) fn deformable(body: &scene::Deformable, folder: &Path) -> Result<DeformableBodyBuilder, String> {
-    let builder = solved_by(mesh(body.body.as_ref(), folder)?, &body.solver);
+    let builder = solved_by(with_boxes(mesh(body, folder)?, &body.regions), &body.solver);
     let builder = builder
         .pose(pose(body.translation, body.rotation))
         .linvel(body.linvel.into())

@@ -4,7 +4,7 @@ mod measures;
 mod shapes;
 
 use super::mistake::{Mistake, unknown};
-use super::{Drop, Joint, JointKind, Kind, Rigid, Scene, Trigger};
+use super::{Body, Deformable, Drop, Joint, JointKind, Kind, Rigid, Scene, Trigger};
 use measures::{check_expectation, check_measure, check_when};
 use shapes::{body_problem, shape_problem};
 use toml::Spanned;
@@ -235,6 +235,27 @@ fn check_bodies(scene: &Scene) -> Result<(), Mistake> {
         problem.map_or(Ok(()), |what| Err((body.body.span(), format!("`body`: {what}"))))?;
         let material = body.material.as_ref().to_material().validate();
         material.map_err(|what| (body.material.span(), format!("`material`: {what}")))?;
+        check_regions(body)?;
+    }
+    Ok(())
+}
+
+/// Either boxes or groups, with materials that can be.
+fn check_regions(body: &Deformable) -> Result<(), Mistake> {
+    for region in &body.regions {
+        let own = region.as_ref();
+        let first = body.regions[0].as_ref();
+        if own.within.is_some() == own.group.is_some() || own.group.is_some() != first.group.is_some() {
+            let message = "`regions` have a `box` each, or a `group` each of a mesh file".into();
+            return Err((region.span(), message));
+        }
+        if own.group.is_some() && !matches!(body.body.as_ref(), Body::Mesh { .. }) {
+            return Err((region.span(), "`group`: only a mesh of a file has groups".into()));
+        }
+        own.material
+            .to_material()
+            .validate()
+            .map_err(|what| (region.span(), format!("`material`: {what}")))?;
     }
     Ok(())
 }
