@@ -26,7 +26,7 @@ pub struct Move {
     /// A kinematic body.
     #[schemars(with = "String")]
     pub of: Spanned<String>,
-    /// Begin and end [s].
+    /// Begin and end \[s\].
     #[schemars(with = "[f32; 2]")]
     pub during: Spanned<[f32; 2]>,
     /// How far it goes \[m\].
@@ -36,7 +36,7 @@ pub struct Move {
 }
 
 impl Move {
-    /// Share of `by` at a time [s].
+    /// Share of `by` at a time \[s\].
     pub fn share(&self, time: f32) -> f32 {
         let [begin, end] = *self.during.as_ref();
         let smooth = |t: f32| t.clamp(0.0, 1.0).powi(2) * (3.0 - 2.0 * t.clamp(0.0, 1.0));

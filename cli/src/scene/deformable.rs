@@ -21,7 +21,7 @@ pub struct Deformable {
     /// Where it is \[m\].
     #[serde(default)]
     pub translation: Vec3,
-    /// Axis times angle [degrees].
+    /// Axis times angle \[degrees\].
     #[serde(default)]
     pub rotation: Vec3,
     /// Velocity \[m/s\].

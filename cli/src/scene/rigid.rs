@@ -27,7 +27,7 @@ pub struct Rigid {
     /// Where it is \[m\].
     #[serde(default)]
     pub translation: Vec3,
-    /// Axis times angle [degrees].
+    /// Axis times angle \[degrees\].
     #[serde(default)]
     pub rotation: Vec3,
     /// Velocity \[m/s\].
@@ -189,7 +189,7 @@ impl JointKind {
     }
 }
 
-/// Drives the free axis of a joint with no more than `max_force` [N, N m].
+/// Drives the free axis of a joint with no more than `max_force` \[N, N m\].
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Motor {
