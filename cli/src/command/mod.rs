@@ -70,6 +70,23 @@ enum Format {
     Json,
 }
 
+/// What running scenes and running their cases have in common.
+#[derive(Debug, clap::Args)]
+struct Choice {
+    /// Only scenes, or cases of a sweep, whose name has this in it.
+    #[arg(long)]
+    only: Option<String>,
+    /// A parameter or a dotted path, NAME=VALUE; may be given more than once.
+    #[arg(long, value_parser = parse_set)]
+    set: Vec<(String, String)>,
+    /// How results are printed.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+    /// Also writes JUnit's XML.
+    #[arg(long)]
+    junit: Option<PathBuf>,
+}
+
 /// Runs the command with the arguments of the process.
 pub fn main() -> ExitCode {
     let code = match Arguments::parse().command {

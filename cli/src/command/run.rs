@@ -1,7 +1,7 @@
 //! `foible run`.
 
 use super::progress::bar;
-use super::{FAILED, Format, MET, STOPPED, is_stopped, name_of, parse_set, scene_files, stop_flag};
+use super::{Choice, FAILED, Format, MET, STOPPED, is_stopped, name_of, scene_files, stop_flag};
 use crate::baseline::{self, Baseline, Drift};
 use crate::report::{PageOfRun, lines, of_drifts, of_run, page_of_run, to_xml};
 use crate::run::Trace;
@@ -21,18 +21,8 @@ pub(super) struct Run {
     /// Scenes side by side.
     #[arg(long, default_value_t = 1)]
     jobs: usize,
-    /// Only scenes whose name has this in it.
-    #[arg(long)]
-    only: Option<String>,
-    /// A parameter or a dotted path, NAME=VALUE; may be given more than once.
-    #[arg(long, value_parser = parse_set)]
-    set: Vec<(String, String)>,
-    /// How results are printed.
-    #[arg(long, value_enum, default_value_t)]
-    format: Format,
-    /// Also writes JUnit's XML.
-    #[arg(long)]
-    junit: Option<PathBuf>,
+    #[command(flatten)]
+    choice: Choice,
     /// Pictures per second of the replay, 0 for none; 60 if not given, and more of scenes that are short.
     #[arg(long)]
     replay_rate: Option<f64>,
@@ -43,8 +33,8 @@ pub(super) struct Run {
 
 impl Run {
     pub fn main(&self) -> Result<u8, String> {
-        let files = scene_files(&self.scenes, self.only.as_deref())?;
-        let jobs = jobs(&files, &self.set, &self.out)?;
+        let files = scene_files(&self.scenes, self.choice.only.as_deref())?;
+        let jobs = jobs(&files, &self.choice.set, &self.out)?;
         let done = self.run(&jobs)?;
         let mut drifts = Vec::new();
         for (done, file) in done.iter().zip(&files) {
@@ -53,14 +43,14 @@ impl Run {
         for (done, drifts) in done.iter().zip(&drifts) {
             write_page(done, drifts)?;
         }
-        if let Some(path) = &self.junit {
+        if let Some(path) = &self.choice.junit {
             let runs: Vec<_> =
                 done.iter().zip(&drifts).map(|(d, drifts)| (&d.outcome, &d.costs, &drifts[..])).collect();
             std::fs::write(path, to_xml(&runs)?).map_err(|e| format!("{}: {e}", path.display()))?;
         }
         let failures: usize = done.iter().map(|d| d.outcome.failures()).sum::<usize>()
             + drifts.iter().map(Vec::len).sum::<usize>();
-        match self.format {
+        match self.choice.format {
             Format::Json => println!("{}", json(&done)?),
             Format::Text => {
                 for (done, drifts) in done.iter().zip(&drifts) {
@@ -102,7 +92,7 @@ impl Run {
 
     fn drifts(&self, scene: &Path, done: &Done) -> Result<Vec<Drift>, String> {
         // What is set is not what was blessed.
-        if self.no_baseline || !self.set.is_empty() {
+        if self.no_baseline || !self.choice.set.is_empty() {
             return Ok(Vec::new());
         }
         let baseline = Baseline::read(&baseline::path_of(scene))?;

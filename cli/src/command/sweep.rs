@@ -1,7 +1,7 @@
 //! `foible sweep`.
 
 use super::progress::bar;
-use super::{FAILED, Format, MET, STOPPED, is_stopped, name_of, parse_set, stop_flag, threads};
+use super::{Choice, FAILED, Format, MET, STOPPED, is_stopped, name_of, stop_flag, threads};
 use crate::report::{of_sweep, page_of_sweep, to_xml};
 use crate::scene::SceneFile;
 use crate::sweep::{Done, Job, JobOptions, Table, cases, jobs, run_jobs};
@@ -20,18 +20,8 @@ pub(super) struct Sweep {
     /// Cases side by side; as many as the machine has threads if not given.
     #[arg(long)]
     jobs: Option<usize>,
-    /// Only cases whose name has this in it.
-    #[arg(long)]
-    only: Option<String>,
-    /// A parameter or a dotted path, NAME=VALUE, for all cases; may be given more than once.
-    #[arg(long, value_parser = parse_set)]
-    set: Vec<(String, String)>,
-    /// How results are printed.
-    #[arg(long, value_enum, default_value_t)]
-    format: Format,
-    /// Also writes JUnit's XML.
-    #[arg(long)]
-    junit: Option<PathBuf>,
+    #[command(flatten)]
+    choice: Choice,
     /// Runs all cases again.
     #[arg(long)]
     fresh: bool,
@@ -47,12 +37,12 @@ impl Sweep {
         let table = Table::of(&done);
         let out = self.folder();
         write_table(&name_of(&self.scene), &table, &done, &out)?;
-        if let Some(path) = &self.junit {
+        if let Some(path) = &self.choice.junit {
             let runs: Vec<_> = done.iter().map(|d| (&d.outcome, &d.costs, &[][..])).collect();
             std::fs::write(path, to_xml(&runs)?).map_err(|e| format!("{}: {e}", path.display()))?;
         }
         let failed = done.iter().filter(|d| d.outcome.failures() > 0).count();
-        match self.format {
+        match self.choice.format {
             Format::Json => println!("{}", super::run::json(&done)?),
             Format::Text => {
                 print!("{}", of_sweep(&table));
@@ -80,7 +70,7 @@ impl Sweep {
 
     fn cases(&self) -> Result<Vec<Job>, String> {
         let said = |what: String| format!("{}: {what}", self.scene.display());
-        let file = SceneFile::read(&self.scene, &self.set).map_err(|e| said(e.to_string()))?;
+        let file = SceneFile::read(&self.scene, &self.choice.set).map_err(|e| said(e.to_string()))?;
         let sweep = file
             .scene
             .sweep
@@ -88,8 +78,8 @@ impl Sweep {
             .ok_or_else(|| said("has no [sweep]; `foible run` runs it once".into()))?;
         let cases = cases(sweep).map_err(said)?;
         let mut jobs =
-            jobs(&self.scene, cases, &self.set, &self.folder()).map_err(|e| said(e.to_string()))?;
-        if let Some(only) = &self.only {
+            jobs(&self.scene, cases, &self.choice.set, &self.folder()).map_err(|e| said(e.to_string()))?;
+        if let Some(only) = &self.choice.only {
             jobs.retain(|job| job.case.name.contains(only.as_str()));
         }
         if jobs.is_empty() { Err(said("no case has that name".into())) } else { Ok(jobs) }
