@@ -24,7 +24,7 @@ pub struct Blessed {
 }
 
 /// A number that is not what it was.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Drift {
     /// Of the number.
     pub name: String,
@@ -129,7 +129,8 @@ mod tests {
 
     #[test]
     fn what_is_off_or_gone_has_drifted() {
-        let measured = |name: &str, value| Measured { name: name.into(), value, unit: "m".into() };
+        let measured =
+            |name: &str, value| Measured { name: name.into(), value, unit: "m".into(), place: None };
         let outcome = |a, b: Option<f64>| Outcome {
             finals: [Some(measured("a", a)), b.map(|b| measured("b", b))].into_iter().flatten().collect(),
             ..Outcome::default()

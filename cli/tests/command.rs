@@ -157,3 +157,110 @@ fn an_interrupt_keeps_what_is_finished() {
     let rows = std::fs::read_to_string(folder.join("out/cases.csv")).unwrap().lines().count();
     assert!((3..100).contains(&rows), "{rows}");
 }
+
+const CUBE: &str = r#"
+parameters = { height = 0.2 }
+world = { duration = 0.1, dt = 0.005 }
+rigid = [{ name = "floor", kind = "fixed", shape = { cuboid = { half_extents = [1, 0.1, 1] } }, translation = [0, -0.1, 0] }]
+deformable = [{ name = "a, b", body = { lattice = { half_extents = [0.05, 0.05, 0.05], cells = [2, 2, 2] } },
+    translation = [0, 0.5, 0], material = { youngs_modulus = 1e6, poisson_ratio = 0.4 } }]
+drop = { members = ["a, b"], height = "=height" }
+expect = [{ quantity = "y", of = "a, b", at_least = 0.0 }, { quantity = "y", of = "a, b", holds = "always", at_most = 3.1 }]
+sweep = { over = { height = [0.2, 0.4] } }
+"#;
+
+/// Names with commas, numbers of the same name, and a replay that is no longer asked for.
+#[test]
+fn results_are_of_the_last_run_only() {
+    let folder = folder("last");
+    std::fs::write(folder.join("cube.toml"), CUBE).unwrap();
+    foible_exits(&folder, &["bless", "cube.toml", "--out", "blessed"], 0);
+    assert!(!folder.join("target").exists());
+    let said = foible_exits(&folder, &["run", "cube.toml", "--out", "out"], 0);
+    assert!(said.contains("y of a, b #2"), "{said}");
+    let page = || std::fs::read_to_string(folder.join("out/cube/index.html")).unwrap();
+    assert!(page().contains("replay-data"));
+    foible_exits(&folder, &["run", "cube.toml", "--out", "out", "--replay-rate", "0"], 0);
+    assert!(!folder.join("out/cube/replay.bin").exists() && !page().contains("replay-data"));
+    // The last of two values counts.
+    let twice = ["--set", "world.dt=0.01", "--set", "world.dt=0.02", "--format", "json"];
+    let output = common::foible(&folder, &[&["run", "cube.toml", "--out", "out"][..], &twice].concat());
+    let read: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(read[0]["outcome"]["steps"], 5);
+}
+
+/// Baselines of cases are compared by sweeps too, reports keep what has moved, and tables all that is there.
+#[test]
+fn sweeps_have_baselines_and_whole_tables() {
+    let folder = folder("sweeps");
+    std::fs::write(folder.join("cube.toml"), CUBE).unwrap();
+    foible_exits(&folder, &["bless", "cube.toml"], 0);
+    foible_exits(&folder, &["sweep", "cube.toml", "--out", "out"], 0);
+    replace(&folder.join("cube.toml"), "1e6", "2e5");
+    let said = foible_exits(&folder, &["sweep", "cube.toml", "--out", "out"], 1);
+    assert!(said.contains("DRIFT") && said.contains("2 failed"), "{said}");
+    let said = foible_exits(&folder, &["report", "out", "--junit", "a.xml"], 1);
+    assert!(said.contains("DRIFT"), "{said}");
+    assert!(std::fs::read_to_string(folder.join("a.xml")).unwrap().contains("baseline of"));
+    let said = foible_exits(
+        &folder,
+        &["sweep", "cube.toml", "--out", "out", "--no-baseline", "--only", "height=0.4"],
+        0,
+    );
+    assert!(said.contains("2 of 2 cases, 2 of them were there already"), "{said}");
+    assert_eq!(std::fs::read_to_string(folder.join("out/cases.csv")).unwrap().lines().count(), 3);
+    foible_exits(&folder, &["sweep", "cube.toml", "--out", "out", "--no-baseline", "--replay-rate", "30"], 0);
+    assert!(folder.join("out/0001/replay.bin").exists());
+    let said = foible_exits(&folder, &["sweep", "cube.toml", "--set", "height=3", "--out", "out"], 2);
+    assert!(said.contains("the sweep sets it"), "{said}");
+}
+
+/// What is there but cannot be, said before anything is run.
+#[test]
+fn scenes_that_cannot_be_run_are_refused_first() {
+    let folder = folder("refused");
+    for (from, to, says) in [
+        (
+            "lattice = { half_extents = [0.05, 0.05, 0.05], cells = [2, 2, 2] }",
+            "mesh = { path = \"nope.obj\" }",
+            "there is no file nope.obj",
+        ),
+        ("members = [\"a, b\"]", "members = [\"a, b\", \"floor\"]", "does not fall"),
+        ("dt = 0.005", "dt = 0.005, gravity = [0, 0, -9.81]", "a drop falls along -y"),
+        ("dt = 0.005", "dt = 0.2", "no step"),
+    ] {
+        std::fs::write(folder.join("cube.toml"), CUBE.replace(from, to)).unwrap();
+        let said = foible_exits(&folder, &["check", "cube.toml"], 2);
+        assert!(said.contains(says), "{says}: {said}");
+        foible_exits(&folder, &["run", "cube.toml"], 2);
+    }
+    std::fs::write(
+        folder.join("cube.toml"),
+        CUBE.replace(
+            "poisson_ratio = 0.4 }",
+            "poisson_ratio = 0.4 }, pinned = { min = [5, 5, 5], max = [6, 6, 6] }",
+        ),
+    )
+    .unwrap();
+    let said = foible_exits(&folder, &["run", "cube.toml"], 1);
+    assert!(said.contains("no vertex is in its boxes"), "{said}");
+    foible_exits(&folder, &["new", "x.toml", "--scale", "2"], 2);
+}
+
+/// Where nobody reads on the verdict is that of the run.
+#[test]
+#[cfg(unix)]
+fn a_closed_pipe_is_no_panic() {
+    let folder = folder("pipe");
+    std::fs::write(folder.join("cube.toml"), CUBE).unwrap();
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_foible"));
+    command.current_dir(&folder).args(["run", "cube.toml", "--format", "json"]);
+    let mut child =
+        command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).contains("panicked")),
+        (Some(0), false)
+    );
+}

@@ -193,3 +193,93 @@ fn regions_and_recorded_curves() {
     let wrong = judged(1e-8, "load.z", 4.0).error.unwrap();
     assert!(wrong.contains("no column \"load.z\"") && wrong.contains("load.y"), "{wrong}");
 }
+
+/// A block that slides down a slope, and where a bar that hangs is stressed most.
+#[test]
+fn how_far_a_block_slides_and_where_a_bar_is_stressed_most() {
+    let slides = outcome(
+        r#"
+        world = { duration = 1.0, dt = 0.005 }
+        rigid = [
+            { name = "slope", kind = "fixed", shape = { cuboid = { half_extents = [10, 0.1, 1] } }, rotation = [0, 0, -26.565051], friction = 0.3 },
+            { name = "hook", kind = "fixed", shape = { ball = { radius = 0.1 } }, collides = false },
+        ]
+        deformable = [
+            { name = "block", body = { lattice = { half_extents = [0.1, 0.1, 0.1], cells = [2, 2, 2] } }, rotation = [0, 0, -26.565051],
+              translation = [0.0894427, 0.1788854, 0], material = { youngs_modulus = 1e7, poisson_ratio = 0.3, friction = 0.3 } },
+            { name = "bar", body = { lattice = { half_extents = [0.05, 0.5, 0.05], cells = [1, 10, 1] } }, translation = [0, 5, 5],
+              pinned = { min = [-1, 5.49, 4], max = [1, 6, 6] }, material = { youngs_modulus = 1e6, poisson_ratio = 0, mass_damping = 20 } },
+        ]
+        measure = [
+            { name = "slid", quantity = "slip_speed", of = "block", on = "slope", take = "integral" },
+            { name = "acceleration", quantity = "slip_speed", of = "block", on = "slope", take = "rate", during = [0.2, 1.0] },
+            { name = "drift", quantity = "drift", of = "block" },
+            { name = "stress", quantity = "stress", of = "bar" },
+        ]
+        "#,
+    );
+    // a = g (sin θ − μ cos θ) with tan θ = 1/2.
+    let a = 9.81 * (1.0 - 0.3 * 2.0) / 5f64.sqrt();
+    let near = |name: &str, value: f64, part: f64| {
+        assert!(
+            (number(&slides, name) / value - 1.0).abs() < part,
+            "{name} {} {value}",
+            number(&slides, name)
+        );
+    };
+    near("acceleration", a, 0.01);
+    near("slid", 0.5 * a, 0.02);
+    near("slid", number(&slides, "drift") * 5f64.sqrt() / 2.0, 0.01);
+    // ρ g over the length below the middle of the uppermost tetrahedra: between the whole and one cell less.
+    near("stress", 1000.0 * 9.81 * 0.95, 0.06);
+    let stress = slides.measures.iter().find(|m| m.name == "stress").unwrap();
+    assert!(stress.place.is_some_and(|[_, y, z]| y > 5.35 && (4.9..5.1).contains(&z)), "{stress:?}");
+    assert!(stress.text().contains("Pa at ("), "{}", stress.text());
+}
+
+/// A filtered blow does not depend on how long before it the scene begins, and thick bodies begin above the floor.
+#[test]
+fn the_gap_of_a_drop_is_not_seen_in_its_numbers() {
+    let peak = |gap: f64| {
+        let drop = outcome(&format!(
+            r#"
+            world = {{ duration = 0.35, dt = 0.001 }}
+            rigid = [{{ name = "floor", kind = "fixed", shape = {{ cuboid = {{ half_extents = [2, 0.1, 2] }} }}, translation = [0, -0.1, 0] }}]
+            deformable = [{{ name = "p", body = {{ lattice = {{ half_extents = [0.05, 0.05, 0.05], cells = [2, 2, 2] }} }},
+                material = {{ youngs_modulus = 1e6, poisson_ratio = 0.4 }} }}]
+            drop = {{ members = ["p"], height = 0.5, gap = {gap} }}
+            measure = [
+                {{ name = "force", quantity = "force", of = "p", on = "floor", take = "peak", cfc = 60 }},
+                {{ name = "g", quantity = "acceleration_g", of = "p", take = "peak", cfc = 60 }},
+            ]
+            "#
+        ));
+        [number(&drop, "force"), number(&drop, "g")]
+    };
+    let far = peak(0.1);
+    for gap in [0.001, 0.002, 0.01] {
+        // Where within a step the blow begins changes it by some per cent.
+        let near = peak(gap);
+        for (near, far) in near.iter().zip(far) {
+            assert!((near / far - 1.0).abs() < 0.08, "gap {gap}: {near} {far}");
+        }
+    }
+    for body in [
+        "rope = { points = [[-0.2, 1, 0], [0.2, 1, 0]], segments = 8, radius = 0.05 }",
+        "cloth = { half_extents = [0.2, 0.2], cells = [3, 3], thickness = 0.02 }",
+    ] {
+        let start = outcome(&format!(
+            r#"
+            world = {{ duration = 0.001, dt = 0.001 }}
+            rigid = [{{ name = "floor", kind = "fixed", shape = {{ cuboid = {{ half_extents = [2, 0.1, 2] }} }}, translation = [0, -0.1, 0] }}]
+            deformable = [{{ name = "p", body = {{ {body} }}, material = {{ youngs_modulus = 1e6, poisson_ratio = 0.4 }} }}]
+            drop = {{ members = ["p"], height = 0.02, gap = 0.01 }}
+            measure = [{{ name = "force", quantity = "force_size", of = "p", on = "floor" }}, {{ name = "y", quantity = "y", of = "p" }}]
+            "#
+        ));
+        let half = if body.starts_with("rope") { 0.05 } else { 0.01 };
+        assert_eq!(number(&start, "force"), 0.0, "{body}");
+        let (speed, y) = ((2.0 * 9.81 * 0.01f64).sqrt(), number(&start, "y"));
+        assert!((y - (0.01 + half - 0.001 * speed)).abs() < 1e-3, "{body}: {y}");
+    }
+}

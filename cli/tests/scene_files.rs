@@ -177,6 +177,16 @@ fn formulas_units_and_includes_are_read() {
     let wrong = read(&[]).unwrap_err();
     assert_eq!((wrong.line, wrong.column), (4, 29), "{wrong}");
     assert!(wrong.to_string().contains("_floor.toml, line 4") && wrong.what.contains("wde"), "{wrong}");
+    // What cannot stand behind another file.
+    for (text, says) in
+        [("gravity = [0, 0, 0]\n", "tables only"), ("parameters = { k = 2 }\n", "tables only")]
+    {
+        write("_floor.toml", text);
+        let wrong = read(&[]).unwrap_err();
+        assert!(wrong.what.contains(says) && wrong.to_string().contains("_floor.toml, line 1"), "{wrong}");
+    }
+    write("_floor.toml", "[ parameters ]\nwide = 7\nhigh = \"see [parameters]\"\n");
+    assert_eq!(read(&[]).unwrap().scene.rigid.len(), 0);
     write("_floor.toml", "include = [\"a.toml\"]\n");
     assert!(read(&[]).unwrap_err().what.contains("include"), "{}", read(&[]).unwrap_err());
 }

@@ -14,6 +14,9 @@ use std::path::{Path, PathBuf};
 pub(super) struct Bless {
     /// Scene files, or folders of them; with every case where a scene has a [sweep].
     scenes: Vec<PathBuf>,
+    /// Where results go.
+    #[arg(long, default_value = "target/blessed")]
+    out: PathBuf,
     /// Compares with the baselines that are there, without writing.
     #[arg(long)]
     check: bool,
@@ -35,7 +38,7 @@ impl Bless {
     }
 
     fn bless(&self, path: &Path) -> Result<u8, String> {
-        let all = all_cases(path)?;
+        let all = all_cases(path, &self.out)?;
         let options = JobOptions {
             jobs: self.jobs.unwrap_or_else(threads),
             replay_rate: Some(0.0),
@@ -52,12 +55,12 @@ impl Bless {
         for done in &done {
             let found = earlier.as_ref().map_or(Vec::new(), |earlier| earlier.drifts(&done.outcome));
             if !found.is_empty() {
-                print!("{}:\n{}", done.outcome.title(), of_drifts(&found));
+                say!("{}:\n{}", done.outcome.title(), of_drifts(&found).trim_end());
             }
             drifts += found.len();
         }
         if self.check {
-            println!("{}: {drifts} numbers have moved", path.display());
+            say!("{}: {drifts} numbers have moved", path.display());
             return Ok(if drifts > 0 { FAILED } else { MET });
         }
         let broken = done.iter().find_map(|d| d.outcome.error.clone());
@@ -67,16 +70,16 @@ impl Bless {
         let baseline = Baseline::of(done.iter().map(|d| &d.outcome));
         let baseline = earlier.iter().fold(baseline, Baseline::with_tolerances_of);
         baseline.write(&baseline_path)?;
-        println!("{}: {} cases, {drifts} numbers have moved", baseline_path.display(), done.len());
+        say!("{}: {} cases, {drifts} numbers have moved", baseline_path.display(), done.len());
         Ok(MET)
     }
 }
 
 /// The scene itself, and the cases of its sweep.
-fn all_cases(path: &Path) -> Result<Vec<Job>, String> {
+fn all_cases(path: &Path, out: &Path) -> Result<Vec<Job>, String> {
     let said = |what: String| format!("{}: {what}", path.display());
     let file = SceneFile::read(path, &[]).map_err(|e| said(e.to_string()))?;
-    let out = Path::new("target/blessed").join(super::name_of(path));
+    let out = out.join(super::name_of(path));
     let sweep = file.scene.sweep.clone();
     let mut all =
         vec![Job { file, case: Case { name: String::new(), set: Vec::new() }, folder: out.join("scene") }];

@@ -20,7 +20,7 @@ impl Check {
         let mut wrong = 0;
         for path in scene_files(&self.scenes, None)? {
             match check(&path, &self.set) {
-                Ok(said) => println!("{}: {said}", path.display()),
+                Ok(said) => say!("{}: {said}", path.display()),
                 Err(what) => {
                     eprintln!("{}: {what}", path.display());
                     wrong += 1;

@@ -1,7 +1,16 @@
 //! The command `foible`: its arguments, and what each subcommand does.
 
+/// Prints; where nobody reads on, as behind `| head`, that is no error.
+macro_rules! say {
+    ($($text:tt)*) => {{
+        use std::io::Write;
+        let _ = writeln!(std::io::stdout(), $($text)*);
+    }};
+}
+
 mod bless;
 mod check;
+mod drifts;
 mod new;
 mod progress;
 mod replay;
@@ -99,7 +108,7 @@ pub fn main() -> ExitCode {
         Command::New(new) => new.main(),
         Command::Schema => serde_json::to_string_pretty(&crate::scene::schema())
             .map(|schema| {
-                println!("{schema}");
+                say!("{schema}");
                 MET
             })
             .map_err(|e| e.to_string()),

@@ -14,10 +14,10 @@ pub(super) struct New {
     #[arg(long)]
     mesh: Option<PathBuf>,
     /// Metres per unit of the mesh.
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, requires = "mesh", allow_negative_numbers = true)]
     scale: f64,
     /// Whether z is up in the mesh.
-    #[arg(long)]
+    #[arg(long, requires = "mesh")]
     z_up: bool,
 }
 
@@ -26,6 +26,9 @@ impl New {
         let said = |e: &dyn std::fmt::Display| format!("{}: {e}", self.scene.display());
         if self.scene.exists() {
             return Err(said(&"is there already"));
+        }
+        if !(self.scale > 0.0 && self.scale.is_finite()) {
+            return Err(format!("--scale {} must be positive", self.scale));
         }
         let body = match &self.mesh {
             None => "{ lattice = { half_extents = [\"5 cm\", \"5 cm\", \"5 cm\"], cells = [4, 4, 4] } }"
@@ -38,7 +41,7 @@ impl New {
         };
         std::fs::write(&self.scene, TEMPLATE.replace("BODY", &body)).map_err(|e| said(&e))?;
         let scene = self.scene.display();
-        println!(
+        say!(
             "{scene} is written. Read it, then:\n  foible check {scene}\n  foible run {scene}\n  foible sweep {scene}"
         );
         Ok(MET)

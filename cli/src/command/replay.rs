@@ -65,11 +65,11 @@ impl Replay {
         let film = Film::new(&replay, look);
         if let Some(path) = &self.png {
             film.write_png(path, self.at.unwrap_or(f64::INFINITY))?;
-            println!("{} is written", path.display());
+            say!("{} is written", path.display());
         }
         if let Some(path) = &self.gif {
             film.write_gif(path)?;
-            println!("{} is written", path.display());
+            say!("{} is written", path.display());
         }
         Ok(MET)
     }

@@ -1,7 +1,8 @@
 //! `foible report`.
 
+use super::drifts;
 use super::{FAILED, Format, MET};
-use crate::report::{of_run, of_sweep, to_xml};
+use crate::report::{of_drifts, of_run, of_sweep, to_xml};
 use crate::sweep::{Done, Table, read};
 use std::path::{Path, PathBuf};
 
@@ -21,24 +22,32 @@ pub(super) struct Report {
 impl Report {
     pub fn main(&self) -> Result<u8, String> {
         let done = self.results()?;
+        let drifts: Vec<_> = done.iter().map(drifts::read).collect();
         let is_sweep = done.iter().any(|d| d.folder != self.results);
         let table = Table::of(&done);
         if is_sweep {
             let name = done.first().map_or(String::new(), |d| d.outcome.scene.clone());
             super::sweep::write_table(&name, &table, &done, &self.results)?;
         } else {
-            done.iter().try_for_each(|done| super::run::write_page(done, &[]))?;
+            let mut all = done.iter().zip(&drifts);
+            all.try_for_each(|(done, drifts)| super::run::write_page(done, drifts))?;
         }
         if let Some(path) = &self.junit {
-            let runs: Vec<_> = done.iter().map(|d| (&d.outcome, &d.costs, &[][..])).collect();
+            let runs: Vec<_> =
+                done.iter().zip(&drifts).map(|(d, drifts)| (&d.outcome, &d.costs, &drifts[..])).collect();
             std::fs::write(path, to_xml(&runs)?).map_err(|e| format!("{}: {e}", path.display()))?;
         }
         match self.format {
-            Format::Json => println!("{}", super::run::json(&done)?),
-            Format::Text if is_sweep => print!("{}", of_sweep(&table)),
-            Format::Text => done.iter().for_each(|d| print!("{}", of_run(&d.outcome, &d.costs))),
+            Format::Json => say!("{}", super::run::json(&done)?),
+            Format::Text if is_sweep => say!("{}", of_sweep(&table).trim_end()),
+            Format::Text => done.iter().for_each(|d| say!("{}", of_run(&d.outcome, &d.costs).trim_end())),
         }
-        Ok(if done.iter().any(|d| d.outcome.failures() > 0) { FAILED } else { MET })
+        let moved: Vec<_> = drifts.concat();
+        if !moved.is_empty() && self.format == Format::Text {
+            say!("{}", of_drifts(&moved).trim_end());
+        }
+        let is_failed = !moved.is_empty() || done.iter().any(|d| d.outcome.failures() > 0);
+        Ok(if is_failed { FAILED } else { MET })
     }
 
     /// The results in the folder, or in the folders in it, in order.

@@ -1,8 +1,9 @@
 //! `foible run`.
 
+use super::drifts;
 use super::progress::bar;
 use super::{Choice, FAILED, Format, MET, STOPPED, is_stopped, name_of, scene_files, stop_flag};
-use crate::baseline::{self, Baseline, Drift};
+use crate::baseline::Drift;
 use crate::report::{PageOfRun, lines, of_drifts, of_run, page_of_run, to_xml};
 use crate::run::Trace;
 use crate::scene::SceneFile;
@@ -36,9 +37,11 @@ impl Run {
         let files = scene_files(&self.scenes, self.choice.only.as_deref())?;
         let jobs = jobs(&files, &self.choice.set, &self.out)?;
         let done = self.run(&jobs)?;
-        let mut drifts = Vec::new();
+        // What is set is not what was blessed.
+        let is_compared = !self.no_baseline && self.choice.set.is_empty();
+        let mut drifts: Vec<Vec<Drift>> = Vec::new();
         for (done, file) in done.iter().zip(&files) {
-            drifts.push(self.drifts(file, done)?);
+            drifts.extend(drifts::compare(file, std::slice::from_ref(done), is_compared)?);
         }
         for (done, drifts) in done.iter().zip(&drifts) {
             write_page(done, drifts)?;
@@ -51,13 +54,14 @@ impl Run {
         let failures: usize = done.iter().map(|d| d.outcome.failures()).sum::<usize>()
             + drifts.iter().map(Vec::len).sum::<usize>();
         match self.choice.format {
-            Format::Json => println!("{}", json(&done)?),
+            Format::Json => say!("{}", json(&done)?),
             Format::Text => {
                 for (done, drifts) in done.iter().zip(&drifts) {
-                    print!("{}{}", of_run(&done.outcome, &done.costs), of_drifts(drifts));
-                    println!("  results and a page to look at: {}", done.folder.join("index.html").display());
+                    let text = of_run(&done.outcome, &done.costs) + &of_drifts(drifts);
+                    say!("{}", text.trim_end());
+                    say!("  results and a page to look at: {}", done.folder.join("index.html").display());
                 }
-                println!("\n{} scenes, {failures} failures", done.len());
+                say!("\n{} scenes, {failures} failures", done.len());
             }
         }
         Ok(if is_stopped() {
@@ -88,15 +92,6 @@ impl Run {
         let done = run_jobs(jobs, &options);
         bar.finish_and_clear();
         done
-    }
-
-    fn drifts(&self, scene: &Path, done: &Done) -> Result<Vec<Drift>, String> {
-        // What is set is not what was blessed.
-        if self.no_baseline || !self.choice.set.is_empty() {
-            return Ok(Vec::new());
-        }
-        let baseline = Baseline::read(&baseline::path_of(scene))?;
-        Ok(baseline.map_or(Vec::new(), |baseline| baseline.drifts(&done.outcome)))
     }
 }
 

@@ -1,10 +1,12 @@
 //! `foible sweep`.
 
+use super::drifts;
 use super::progress::bar;
 use super::{Choice, FAILED, Format, MET, STOPPED, is_stopped, name_of, stop_flag, threads};
-use crate::report::{of_sweep, page_of_sweep, to_xml};
+use crate::baseline::Drift;
+use crate::report::{of_drifts, of_sweep, page_of_sweep, to_xml};
 use crate::scene::SceneFile;
-use crate::sweep::{Done, Job, JobOptions, Table, cases, jobs, run_jobs};
+use crate::sweep::{Done, Job, JobOptions, Table, cases, finished, jobs, run_jobs};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
@@ -22,6 +24,9 @@ pub(super) struct Sweep {
     jobs: Option<usize>,
     #[command(flatten)]
     choice: Choice,
+    /// Takes no notice of a baseline.
+    #[arg(long)]
+    no_baseline: bool,
     /// Runs all cases again.
     #[arg(long)]
     fresh: bool,
@@ -32,28 +37,31 @@ pub(super) struct Sweep {
 
 impl Sweep {
     pub fn main(&self) -> Result<u8, String> {
-        let jobs = self.cases()?;
-        let done = self.run(&jobs)?;
-        let table = Table::of(&done);
-        let out = self.folder();
-        write_table(&name_of(&self.scene), &table, &done, &out)?;
+        let all = self.cases()?;
+        let mut chosen = all.clone();
+        if let Some(only) = &self.choice.only {
+            chosen.retain(|job| job.case.name.contains(only.as_str()));
+        }
+        if chosen.is_empty() {
+            return Err(format!("{}: no case has that name", self.scene.display()));
+        }
+        let run = self.run(&chosen)?;
+        // The table has all that is there, also of earlier runs.
+        let is_run = |job: &Job| run.iter().find(|done| done.folder == job.folder).cloned();
+        let done: Vec<Done> = all.iter().filter_map(|job| is_run(job).or_else(|| finished(job))).collect();
+        let is_compared = !self.no_baseline && self.choice.set.is_empty();
+        let drifts = drifts::compare(&self.scene, &done, is_compared)?;
+        write_table(&name_of(&self.scene), &Table::of(&done), &done, &self.folder())?;
         if let Some(path) = &self.choice.junit {
-            let runs: Vec<_> = done.iter().map(|d| (&d.outcome, &d.costs, &[][..])).collect();
+            let runs: Vec<_> =
+                done.iter().zip(&drifts).map(|(d, drifts)| (&d.outcome, &d.costs, &drifts[..])).collect();
             std::fs::write(path, to_xml(&runs)?).map_err(|e| format!("{}: {e}", path.display()))?;
         }
-        let failed = done.iter().filter(|d| d.outcome.failures() > 0).count();
+        let is_failed = |(done, drifts): &(&Done, &Vec<Drift>)| done.outcome.failures() + drifts.len() > 0;
+        let failed = done.iter().zip(&drifts).filter(is_failed).count();
         match self.choice.format {
-            Format::Json => println!("{}", super::run::json(&done)?),
-            Format::Text => {
-                print!("{}", of_sweep(&table));
-                let old = done.iter().filter(|d| d.is_old).count();
-                println!(
-                    "\n{} of {} cases, {old} of them were there already, {failed} failed",
-                    done.len(),
-                    jobs.len()
-                );
-                println!("results and a page to look at: {}", out.join("index.html").display());
-            }
+            Format::Json => say!("{}", super::run::json(&done)?),
+            Format::Text => self.tell(&done, &drifts, all.len(), failed),
         }
         Ok(if is_stopped() {
             STOPPED
@@ -62,6 +70,16 @@ impl Sweep {
         } else {
             MET
         })
+    }
+
+    fn tell(&self, done: &[Done], drifts: &[Vec<Drift>], cases: usize, failed: usize) {
+        say!("{}", of_sweep(&Table::of(done)).trim_end());
+        for (done, drifts) in done.iter().zip(drifts).filter(|(_, drifts)| !drifts.is_empty()) {
+            say!("  [{}]:\n{}", done.outcome.case, of_drifts(drifts).trim_end());
+        }
+        let old = done.iter().filter(|d| d.is_old).count();
+        say!("\n{} of {cases} cases, {old} of them were there already, {failed} failed", done.len());
+        say!("results and a page to look at: {}", self.folder().join("index.html").display());
     }
 
     fn folder(&self) -> PathBuf {
@@ -77,12 +95,7 @@ impl Sweep {
             .as_ref()
             .ok_or_else(|| said("has no [sweep]; `foible run` runs it once".into()))?;
         let cases = cases(sweep).map_err(said)?;
-        let mut jobs =
-            jobs(&self.scene, cases, &self.choice.set, &self.folder()).map_err(|e| said(e.to_string()))?;
-        if let Some(only) = &self.choice.only {
-            jobs.retain(|job| job.case.name.contains(only.as_str()));
-        }
-        if jobs.is_empty() { Err(said("no case has that name".into())) } else { Ok(jobs) }
+        jobs(&self.scene, cases, &self.choice.set, &self.folder()).map_err(|e| said(e.to_string()))
     }
 
     fn run(&self, jobs: &[Job]) -> Result<Vec<Done>, String> {

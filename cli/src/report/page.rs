@@ -49,6 +49,12 @@ pub(super) fn number_cell(value: f64, unit: &str) -> String {
     format!("<td class=\"number\" data-key=\"{key}\">{}</td>", escaped(&number(value, unit)))
 }
 
+/// The cell of a number's name, with its place.
+fn name_cell(measured: &Measured) -> String {
+    let place = measured.place_text().map_or(String::new(), |place| format!(" <small>{place}</small>"));
+    format!("<td>{}{place}</td>", escaped(&measured.name))
+}
+
 /// The page of one run.
 pub fn page_of_run(run: &PageOfRun<'_>) -> String {
     let outcome = run.outcome;
@@ -99,8 +105,8 @@ fn add_verdicts(body: &mut String, outcome: &Outcome) {
         let (class, word) = if verdict.met { ("ok", "met") } else { ("failed", "failed") };
         let _ = writeln!(
             body,
-            "<tr><td class=\"{class}\">{word}</td><td>{}</td>{}<td>{}</td></tr>",
-            escaped(&verdict.measured.name),
+            "<tr><td class=\"{class}\">{word}</td>{}{}<td>{}</td></tr>",
+            name_cell(&verdict.measured),
             number_cell(verdict.measured.value, &verdict.measured.unit),
             escaped(&verdict.wanted)
         );
@@ -125,12 +131,8 @@ fn add_numbers(body: &mut String, title: &str, numbers: &[Measured]) {
         "<h2>{title}</h2>\n<table class=\"sorts\">\n<thead><tr><th>number</th><th class=\"number\">value</th></tr></thead>\n<tbody>"
     );
     for measured in numbers {
-        let _ = writeln!(
-            body,
-            "<tr><td>{}</td>{}</tr>",
-            escaped(&measured.name),
-            number_cell(measured.value, &measured.unit)
-        );
+        let _ =
+            writeln!(body, "<tr>{}{}</tr>", name_cell(measured), number_cell(measured.value, &measured.unit));
     }
     body.push_str("</tbody>\n</table>\n");
 }

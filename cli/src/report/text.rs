@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 fn verdict(text: &mut String, verdict: &Verdict) {
     let word = if verdict.met { "ok    " } else { "FAILED" };
-    let value = number(verdict.measured.value, &verdict.measured.unit);
+    let value = verdict.measured.text();
     let _ = writeln!(text, "  {word} {}: {value} ({})", verdict.measured.name, verdict.wanted);
 }
 
@@ -19,7 +19,7 @@ pub fn of_run(outcome: &Outcome, costs: &Costs) -> String {
     }
     outcome.verdicts.iter().for_each(|own| verdict(&mut text, own));
     for measured in &outcome.measures {
-        let _ = writeln!(text, "         {}: {}", measured.name, number(measured.value, &measured.unit));
+        let _ = writeln!(text, "         {}: {}", measured.name, measured.text());
     }
     let Costs { mean, median, p99, worst, .. } = costs;
     let _ = writeln!(

@@ -1,6 +1,6 @@
 //! What a run depends on, as a short key.
 
-use crate::scene::{Body, SceneFile, Shape};
+use crate::scene::SceneFile;
 
 /// Fowler, Noll and Vo's hash of 64 bits, version 1a: the same on every machine and for every compiler.
 #[derive(Clone, Copy, Debug)]
@@ -21,16 +21,7 @@ pub fn key(file: &SceneFile) -> String {
     let mut digest = Digest(0xcbf2_9ce4_8422_2325);
     digest.add(env!("CARGO_PKG_VERSION").as_bytes());
     digest.add(file.text.as_bytes());
-    let rigid = file.scene.rigid.iter().filter_map(|body| match body.shape.as_ref() {
-        Shape::Mesh { path, .. } => Some(path),
-        _ => None,
-    });
-    let soft = file.scene.deformable.iter().filter_map(|body| match body.body.as_ref() {
-        Body::Mesh { path, .. } => Some(path),
-        _ => None,
-    });
-    let curves = file.scene.expect.iter().filter_map(|e| e.curve.as_ref()).map(|curve| &curve.as_ref().path);
-    for path in rigid.chain(soft).chain(curves) {
+    for path in file.files() {
         digest.add(&std::fs::read(file.folder.join(path)).unwrap_or_default());
     }
     format!("{:016x}", digest.0)

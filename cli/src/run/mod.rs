@@ -132,19 +132,38 @@ fn judge(
             Some(curve) => curve.farthest(&series, signals.window(e, series.len()), outcome.dt),
             None => signals.take(e, &series),
         };
-        outcome.verdicts.push(Verdict::of(e, value));
+        outcome.verdicts.push(Verdict::of(e, value, signals.place(e, &series)));
     }
     for measure in &scene.measure {
-        outcome.measures.push(Measured::of(measure, signals.take(measure, &signals.series(measure))));
+        let series = signals.series(measure);
+        let (value, place) = (signals.take(measure, &series), signals.place(measure, &series));
+        outcome.measures.push(Measured::of(measure, value, place));
     }
+    tell_apart(outcome);
     for (name, body) in &stage.deformable {
         if stage.world.bodies[*body].is_quarantined() {
-            let measured =
-                Measured { name: format!("{name} stays finite"), value: f64::NAN, unit: String::new() };
+            let measured = Measured {
+                name: format!("{name} stays finite"),
+                value: f64::NAN,
+                unit: String::new(),
+                place: None,
+            };
             outcome.verdicts.push(Verdict { measured, wanted: "a state that is finite".into(), met: false });
         }
     }
     outcome.finals = finals(scene, stage);
+}
+
+/// Numbers of the same name get a number behind it.
+fn tell_apart(outcome: &mut Outcome) {
+    let mut known = std::collections::BTreeMap::new();
+    let verdicts = outcome.verdicts.iter_mut().map(|verdict| &mut verdict.measured);
+    for measured in verdicts.chain(&mut outcome.measures) {
+        let times = known.entry(measured.name.clone()).and_modify(|times| *times += 1).or_insert(1usize);
+        if *times > 1 {
+            measured.name = format!("{} #{times}", measured.name);
+        }
+    }
 }
 
 /// Where moving bodies are in the end, and what shape they have.
@@ -153,7 +172,7 @@ fn finals(scene: &Scene, stage: &Stage) -> Vec<Measured> {
     let mut finals = Vec::new();
     let mut add = |quantity: Quantity, of: &str| {
         let (name, value) = (format!("{of}.{}", quantity.name()), stage.measure(quantity, of, None));
-        finals.push(Measured { name, value, unit: quantity.unit().into() });
+        finals.push(Measured { name, value, unit: quantity.unit().into(), place: None });
     };
     for name in scene.names().filter(|name| !fixed(name)) {
         for quantity in [Quantity::X, Quantity::Y, Quantity::Z, Quantity::Speed] {

@@ -39,6 +39,9 @@ pub struct Measured {
     pub value: f64,
     /// Its unit.
     pub unit: String,
+    /// Where it was found, if it is the largest of many \[m\].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub place: Option<[f64; 3]>,
 }
 
 /// An expectation and what became of it.
@@ -80,8 +83,8 @@ impl Outcome {
 }
 
 impl Verdict {
-    /// Of an expectation and its number. NaN meets none.
-    pub fn of(e: &Expect, value: f64) -> Self {
+    /// Of an expectation, its number and where that was found. NaN meets none.
+    pub fn of(e: &Expect, value: f64, place: Option<[f64; 3]>) -> Self {
         let near = |wanted: f64| (value - wanted).abs() <= e.within.unwrap_or(0.0);
         let met = match e.curve {
             Some(_) => value <= e.within.unwrap_or(0.0),
@@ -101,23 +104,37 @@ impl Verdict {
         if let Some(curve) = &e.curve {
             wanted.insert(0, format!("the curve {} of {}", curve.as_ref().column, curve.as_ref().path));
         }
-        Self { measured: Measured::of(e, value), wanted: wanted.join(", "), met }
+        Self { measured: Measured::of(e, value, place), wanted: wanted.join(", "), met }
     }
 }
 
 impl Measured {
-    /// Of a measure and its number.
-    pub fn of(e: &Expect, value: f64) -> Self {
+    /// The number with its unit and place.
+    pub fn text(&self) -> String {
+        let value = number(self.value, &self.unit);
+        self.place_text().map_or(value.clone(), |place| format!("{value} {place}"))
+    }
+
+    /// Its place, to a tenth of a millimetre: "at (0.1, 0, 0.2) m".
+    pub fn place_text(&self) -> Option<String> {
+        let [x, y, z] = self.place?.map(|x| number((x * 1e4).round() * 1e-4, ""));
+        Some(format!("at ({x}, {y}, {z}) m"))
+    }
+
+    /// Of a measure, its number and where that was found.
+    pub fn of(e: &Expect, value: f64, place: Option<[f64; 3]>) -> Self {
         use crate::scene::Take;
         let unit = match e.take {
             Some(Take::PulseTime | Take::SettleTime) => "s".into(),
             Some(Take::Integral) => match *e.quantity.as_ref() {
                 Quantity::Force | Quantity::ForceSize => "N s".into(),
+                Quantity::SlipSpeed | Quantity::Speed | Quantity::VelocityY => "m".into(),
                 other => format!("{} s", other.unit()),
             },
+            Some(Take::Rate) => format!("{}/s", e.quantity.as_ref().unit()),
             _ => e.quantity.as_ref().unit().to_string(),
         };
-        Self { name: e.title(), value, unit }
+        Self { name: e.title(), value, unit, place }
     }
 }
 

@@ -29,6 +29,8 @@ impl Key {
 enum Values {
     Numbers(Vec<f64>),
     Velocities(Vec<[f64; 3]>),
+    /// With the places where they are.
+    Placed(Vec<f64>, Vec<[f64; 3]>),
 }
 
 /// All that is measured of a run, step by step.
@@ -36,6 +38,7 @@ enum Values {
 pub struct Signals {
     dt: f64,
     gravity: [f64; 3],
+    is_drop: bool,
     signals: Vec<(Key, Values)>,
 }
 
@@ -49,12 +52,13 @@ impl Signals {
             }
             let values = match key.quantity {
                 Quantity::AccelerationG => Values::Velocities(vec![stage.velocity(&key.of)]),
+                largest if largest.has_place() => Values::Placed(Vec::new(), Vec::new()),
                 _ => Values::Numbers(Vec::new()),
             };
             signals.push((key, values));
         }
         let (_, dt) = scene.steps();
-        Self { dt, gravity: scene.world.gravity.map(f64::from), signals }
+        Self { dt, gravity: scene.world.gravity.map(f64::from), is_drop: scene.drop.is_some(), signals }
     }
 
     /// Takes the values after a step.
@@ -65,6 +69,11 @@ impl Signals {
                     values.push(stage.measure(key.quantity, &key.of, key.on.as_deref()))
                 }
                 Values::Velocities(values) => values.push(stage.velocity(&key.of)),
+                Values::Placed(values, places) => {
+                    let (value, place) = stage.measure_with_place(key.quantity, &key.of);
+                    values.push(value);
+                    places.push(place);
+                }
             }
         }
     }
@@ -82,10 +91,14 @@ impl Signals {
 
     fn values(&self, key: &Key, class: Option<u32>) -> Vec<f64> {
         let found = self.signals.iter().find(|(own, _)| own == key).map(|(_, values)| values);
-        let filtered =
-            |values: Vec<f64>| class.map_or(values.clone(), |class| channel_filter(&values, class, self.dt));
+        // In the fall before the scene nothing touched, and an accelerometer showed nothing.
+        let is_blow = matches!(key.quantity, Quantity::AccelerationG | Quantity::Force | Quantity::ForceSize);
+        let before = (self.is_drop && is_blow).then_some(0.0);
+        let filtered = |values: Vec<f64>| {
+            class.map_or(values.clone(), |class| channel_filter(&values, class, self.dt, before))
+        };
         match found {
-            Some(Values::Numbers(values)) => filtered(values.clone()),
+            Some(Values::Numbers(values) | Values::Placed(values, _)) => filtered(values.clone()),
             Some(Values::Velocities(values)) => {
                 let along = |k: usize| {
                     let steps = values.windows(2).map(|v| (v[1][k] - v[0][k]) / self.dt - self.gravity[k]);
@@ -108,19 +121,48 @@ impl Signals {
         first.min(end)..end
     }
 
+    fn step_at(&self, time: f32, steps: usize) -> usize {
+        let step = (f64::from(time) / self.dt - 0.5).ceil().max(1.0) as usize;
+        (step - 1).min(steps.saturating_sub(1))
+    }
+
+    /// Where the number of a measure was found, if it has a place \[m\].
+    pub fn place(&self, e: &Expect, series: &[f64]) -> Option<[f64; 3]> {
+        if e.minus.is_some() || e.holds.is_some() {
+            return None;
+        }
+        let key = Key::of(e).into_iter().next()?;
+        let (_, Values::Placed(_, places)) = self.signals.iter().find(|(own, _)| *own == key)? else {
+            return None;
+        };
+        let window = self.window(e, series.len());
+        let step = match (&e.at, e.take.unwrap_or_default()) {
+            (Some(at), _) => self.step_at(*at.as_ref(), series.len()),
+            (None, Take::Last) => window.end.checked_sub(1)?,
+            (None, Take::Max | Take::Peak) => window.max_by(|a, b| series[*a].total_cmp(&series[*b]))?,
+            _ => return None,
+        };
+        places.get(step).copied().filter(|place| place.iter().all(|x| x.is_finite()))
+    }
+
     /// The number of a measure. NaN if there is no step in its time.
     pub fn take(&self, e: &Expect, series: &[f64]) -> f64 {
         if let Some(at) = &e.at {
-            let step = (f64::from(*at.as_ref()) / self.dt - 0.5).ceil().max(1.0) as usize;
-            return series.get((step - 1).min(series.len().saturating_sub(1))).copied().unwrap_or(f64::NAN);
+            return series.get(self.step_at(*at.as_ref(), series.len())).copied().unwrap_or(f64::NAN);
         }
-        let values = &series[self.window(e, series.len())];
+        let window = self.window(e, series.len());
+        let start = window.start as f64 * self.dt;
+        let values = &series[window];
         if values.is_empty() {
             return f64::NAN;
         }
         match e.holds {
             Some(holds) => bound_value(e, holds, values),
-            None => reduced(e.take.unwrap_or_default(), values, self.dt, e.within.unwrap_or(0.0)),
+            None => {
+                let value = reduced(e.take.unwrap_or_default(), values, self.dt, e.within.unwrap_or(0.0));
+                // From the start of the scene, not of the window.
+                if e.take == Some(Take::SettleTime) { start + value } else { value }
+            }
         }
     }
 }
@@ -139,6 +181,8 @@ fn reduced(take: Take, values: &[f64], dt: f64, within: f64) -> f64 {
         Take::Min => -largest(all().map(|v| -v)),
         Take::Peak => largest(all().map(f64::abs)),
         Take::Range => largest(all()) + largest(all().map(|v| -v)),
+        Take::Rate if values.len() < 2 => f64::NAN,
+        Take::Rate => (last - values[0]) / ((values.len() - 1) as f64 * dt),
         Take::Mean => all().sum::<f64>() / values.len() as f64,
         Take::Integral => all().sum::<f64>() * dt,
         Take::PulseTime => pulse(values) * dt,
@@ -156,6 +200,9 @@ fn reduced(take: Take, values: &[f64], dt: f64, within: f64) -> f64 {
 /// Samples around the peak that are above a tenth of it.
 fn pulse(values: &[f64]) -> f64 {
     let peak = (0..values.len()).max_by(|a, b| values[*a].abs().total_cmp(&values[*b].abs())).unwrap_or(0);
+    if values[peak] == 0.0 {
+        return 0.0;
+    }
     let is_in = |k: &usize| values[*k].abs() >= 0.1 * values[peak].abs();
     let before = (0..peak).rev().take_while(is_in).count();
     let after = (peak + 1..values.len()).take_while(is_in).count();
@@ -199,8 +246,11 @@ mod tests {
         let length = 0.1 * (1.0 - 2.0 * 0.1f64.asin() / std::f64::consts::PI);
         assert!((of(Take::PulseTime) - length).abs() < 2.0 * dt, "{} {length}", of(Take::PulseTime));
         assert!((of(Take::SettleTime) - 0.1).abs() < 2.0 * dt);
+        let rises: Vec<f64> = (0..11).map(|k| 3.0 * f64::from(k) * dt).collect();
+        assert!((reduced(Take::Rate, &rises, dt, 0.0) - 3.0).abs() < 1e-9);
         let falls: Vec<f64> = vec![1.0, 0.5, 0.1, 0.4, 0.6, 0.2];
         assert!((reduced(Take::Rebound, &falls, dt, 0.0) - 0.5).abs() < 1e-12);
+        assert_eq!(reduced(Take::PulseTime, &[0.0; 50], dt, 0.0), 0.0);
         assert!(reduced(Take::Max, &[0.0, f64::NAN, 1.0], dt, 0.0).is_nan());
     }
 }

@@ -3,7 +3,6 @@
 use super::outcome::Costs;
 use crate::scene::Quantity;
 use crate::stage::Stage;
-use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
 
@@ -70,13 +69,12 @@ impl Trace {
     /// # Errors
     /// A file that cannot be written.
     pub fn write_csv(&self, path: &Path) -> std::io::Result<()> {
-        let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
-        writeln!(file, "{}", self.names.join(","))?;
+        let mut writer = csv::Writer::from_path(path)?;
+        writer.write_record(&self.names)?;
         for row in &self.rows {
-            let cells: Vec<String> = row.iter().map(|v| format!("{v:.9e}")).collect();
-            writeln!(file, "{}", cells.join(","))?;
+            writer.write_record(row.iter().map(|v| format!("{v:.9e}")))?;
         }
-        file.flush()
+        writer.flush()
     }
 
     /// Reads what was written.

@@ -97,6 +97,8 @@ pub enum Quantity {
     Force,
     /// Size of that force \[N\].
     ForceSize,
+    /// Speed at which the contacts between the body and `on` slide, the mean by their forces \[m/s\]; its integral is how far it slid.
+    SlipSpeed,
     /// Deepest penetration of the body's contacts \[m\].
     Penetration,
     /// Angle between the body's upright axis and where it was at the start \[degrees\].
@@ -137,6 +139,8 @@ pub enum Take {
     Peak,
     /// The largest less the least.
     Range,
+    /// The last less the first, over the time between them.
+    Rate,
     /// The mean over time.
     Mean,
     /// The integral over time: impulse of a force, velocity change of an acceleration.
@@ -178,14 +182,19 @@ impl Quantity {
         )
     }
 
+    /// Whether it is the largest of many, which has a place.
+    pub fn has_place(self) -> bool {
+        matches!(self, Self::Stress | Self::Strain)
+    }
+
     /// Whether it is summed over steps.
     pub fn is_of_steps(self) -> bool {
         matches!(self, Self::StepLoss | Self::EnergyBalance)
     }
 
-    /// Whether it is between two bodies.
+    /// Whether it is of the contacts between two bodies.
     pub fn is_force(self) -> bool {
-        matches!(self, Self::Force | Self::ForceSize)
+        matches!(self, Self::Force | Self::ForceSize | Self::SlipSpeed)
     }
 
     /// Whether only deformables have it.
@@ -205,7 +214,7 @@ impl Quantity {
     pub fn unit(self) -> &'static str {
         match self {
             Self::X | Self::Y | Self::Z | Self::Penetration | Self::Drift => "m",
-            Self::Speed | Self::VelocityY => "m/s",
+            Self::Speed | Self::VelocityY | Self::SlipSpeed => "m/s",
             Self::AccelerationG => "g",
             Self::Force | Self::ForceSize => "N",
             Self::Tilt => "°",

@@ -153,7 +153,27 @@ impl SceneFile {
         let (scene, source, text) = resolve(Source::read(path)?, set)?;
         let name = path.file_stem().map_or("scene".into(), |s| s.to_string_lossy().into_owned());
         let paths = source.paths().map(Path::to_path_buf).collect();
-        Ok(Self { scene, folder: path.parent().unwrap_or(Path::new("")).to_path_buf(), name, text, paths })
+        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        let file = Self { scene, folder, name, text, paths };
+        let missing = file.files().map(|path| file.folder.join(path)).find(|path| !path.is_file());
+        match missing {
+            Some(path) => Err(SceneError::elsewhere(format!("there is no file {}", path.display()))),
+            None => Ok(file),
+        }
+    }
+
+    /// Meshes and curves that the scene names, relative to its folder.
+    pub fn files(&self) -> impl Iterator<Item = &str> {
+        let rigid = self.scene.rigid.iter().filter_map(|body| match body.shape.as_ref() {
+            Shape::Mesh { path, .. } => Some(path.as_str()),
+            _ => None,
+        });
+        let soft = self.scene.deformable.iter().filter_map(|body| match body.body.as_ref() {
+            Body::Mesh { path, .. } => Some(path.as_str()),
+            _ => None,
+        });
+        let curves = self.scene.expect.iter().filter_map(|e| e.curve.as_ref());
+        rigid.chain(soft).chain(curves.map(|curve| curve.as_ref().path.as_str()))
     }
 }
 

@@ -63,7 +63,13 @@ impl Source {
         self.files.iter().map(|file| file.path.as_path())
     }
 
-    fn add(&mut self, path: PathBuf, mut text: String, depth: usize) -> Result<(), SceneError> {
+    fn add(&mut self, path: PathBuf, text: String, depth: usize) -> Result<(), SceneError> {
+        let own = (depth > 0).then(|| path.clone());
+        self.add_text(path, text, depth)
+            .map_err(|error| SceneError { file: error.file.clone().or(own), ..error })
+    }
+
+    fn add_text(&mut self, path: PathBuf, mut text: String, depth: usize) -> Result<(), SceneError> {
         if !text.ends_with('\n') {
             text.push('\n');
         }
@@ -75,7 +81,8 @@ impl Source {
             ));
         }
         let single = Self { files: vec![File { path: path.clone(), text: text.clone() }], edits: Vec::new() };
-        let table = DeTable::parse(&text).map_err(|error| single.syntax_error(&error))?;
+        let original = text.clone();
+        let table = DeTable::parse(&original).map_err(|error| single.syntax_error(&error))?;
         let mut included = Vec::new();
         if let Some((key, value)) = table.get_ref().iter().find(|(key, _)| key.get_ref() == "include") {
             let names = value.get_ref().as_array().map(|names| names.iter().map(|n| n.get_ref().as_str()));
@@ -86,17 +93,20 @@ impl Source {
             // Out of the text, which goes before or behind that of others, with every place where it was.
             let range = key.span().start..value.span().end;
             let blank: String =
-                text[range.clone()].chars().map(|c| if c == '\n' { '\n' } else { ' ' }).collect();
-            if blank.len() == range.len() {
-                text.replace_range(range, &blank);
-            }
+                text[range.clone()].bytes().map(|b| if b == b'\n' { '\n' } else { ' ' }).collect();
+            text.replace_range(range, &blank);
         }
-        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         let number = self.files.len();
         if number > 0 {
-            // A table of its own; the scene's own parameters come first.
-            text = text.replace("[parameters]", &format!("[parameters.{number:04}]"));
+            self.check_included(&single, table.get_ref())?;
         }
+        if let Some((key, _)) = table.get_ref().iter().find(|(key, _)| key.get_ref() == "parameters")
+            && number > 0
+        {
+            // A table of its own; the scene's own parameters come first.
+            text.replace_range(key.span(), &format!("parameters.{number:04}"));
+        }
+        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         self.files.push(File { path, text });
         for (span, name) in included {
             let path = folder.join(&name);
@@ -108,6 +118,31 @@ impl Source {
             self.add(path, text, depth + 1)?;
         }
         Ok(())
+    }
+
+    /// Whether a file can go on behind another: it has tables only, and so have the parameters before it.
+    fn check_included(&self, own: &Self, table: &DeTable<'_>) -> Result<(), SceneError> {
+        let is_header = |text: &str, at: usize| text[..at].trim_end_matches([' ', '\t']).ends_with('[');
+        let text = &own.files[0].text;
+        for (key, _) in table.iter().filter(|(key, _)| key.get_ref() != "include") {
+            if !is_header(text, key.span().start) {
+                let what = format!(
+                    "an included file has tables only: write `[{}]`, or put it into one",
+                    key.get_ref()
+                );
+                return Err(own.error(key.span(), what));
+            }
+        }
+        let first = DeTable::parse(&self.files[0].text).ok();
+        let parameters =
+            first.as_ref().and_then(|t| t.get_ref().iter().find(|(key, _)| key.get_ref() == "parameters"));
+        match parameters {
+            Some((key, _)) if !is_header(&self.files[0].text, key.span().start) => {
+                let what = "where files are included, `[parameters]` is a table of its own, not `parameters = { … }`";
+                Err(self.error(key.span(), what.into()))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn whole(&self) -> String {
@@ -127,7 +162,11 @@ impl Source {
         let mut edits = Vec::new();
         let paths: Vec<_> = set.iter().filter(|(name, value)| !parameters.set(name, value)).collect();
         let values = parameters.resolved().map_err(|(at, what)| self.error(at, what))?;
-        for (path, value) in paths {
+        for (k, (path, value)) in paths.iter().enumerate() {
+            // The last one counts, as of parameters.
+            if paths[k + 1..].iter().any(|(later, _)| later == path) {
+                continue;
+            }
             let said = |what| SceneError::of_set(path, what);
             let place = values::place_of(table.get_ref(), &whole, path).map_err(said)?;
             let value = values.literal(value).map_err(said)?;

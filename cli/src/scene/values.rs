@@ -265,8 +265,7 @@ fn number(value: f64) -> String {
 
 /// A value of a command line as TOML: as it stands if it is one, quoted if not.
 pub fn literal(text: &str) -> String {
-    let is_value = DeValue::parse(text).is_ok_and(|value| !value.get_ref().is_table());
-    if is_value { text.to_string() } else { toml::Value::from(text).to_string() }
+    if DeValue::parse(text).is_ok() { text.to_string() } else { toml::Value::from(text).to_string() }
 }
 
 /// Where a value is put in, and what goes around it.

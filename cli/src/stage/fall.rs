@@ -1,12 +1,12 @@
 //! A package that falls: its bodies turned together, placed above what they fall on, with the speed of the fall.
 
 use super::Stage;
-use crate::scene::Drop;
+use crate::scene::{Body, Deformable, Drop, Scene};
 use rapier3d::prelude::*;
 
 impl Stage {
     /// Turns, places and speeds up the members of a drop; names were checked with the file.
-    pub(super) fn fall(&mut self, drop: &Drop) -> Result<(), String> {
+    pub(super) fn fall(&mut self, scene: &Scene, drop: &Drop) -> Result<(), String> {
         let is_member = |name: &str| drop.members.iter().any(|m| m.as_ref() == name);
         let rigid: Vec<RigidBodyHandle> =
             self.rigid.iter().filter(|r| is_member(&r.0)).map(|r| r.1).collect();
@@ -18,8 +18,12 @@ impl Stage {
                 let collider = &self.physics.colliders[*collider];
                 collider.shape().compute_aabb(&(turn * *collider.position())).mins.y
             });
-        let positions = soft.iter().flat_map(|body| self.world.bodies[*body].positions());
-        let lowest = lowest_rigid.chain(positions.map(|p| (turn * p).y)).fold(f32::INFINITY, f32::min);
+        let margins: Vec<f32> =
+            scene.deformable.iter().filter(|d| is_member(d.name.as_ref())).map(half_thickness).collect();
+        let lowest_soft = soft.iter().zip(margins).flat_map(|(body, margin)| {
+            self.world.bodies[*body].positions().map(move |p| (turn * p).y - margin)
+        });
+        let lowest = lowest_rigid.chain(lowest_soft).fold(f32::INFINITY, f32::min);
         if !lowest.is_finite() {
             return Err("drop: its members have no lowest point".into());
         }
@@ -43,5 +47,14 @@ impl Stage {
         // Colliders follow their bodies in rapier's next step; contacts of the first one are looked for before it.
         self.physics.bodies.propagate_modified_body_positions_to_colliders(&mut self.physics.colliders);
         Ok(())
+    }
+}
+
+/// How far a body reaches beyond its vertices \[m\].
+fn half_thickness(body: &Deformable) -> f32 {
+    match body.body.as_ref() {
+        Body::Rope { radius, .. } => *radius,
+        Body::Cloth { thickness, .. } => 0.5 * thickness,
+        _ => 0.0,
     }
 }

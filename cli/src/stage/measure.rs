@@ -61,6 +61,7 @@ impl Stage {
             },
             Quantity::Force => self.force(of, on)[1],
             Quantity::ForceSize => size(self.force(of, on)),
+            Quantity::SlipSpeed => self.slip_speed(of, on),
             Quantity::Tilt => self.tilt(of),
             Quantity::Drift => self
                 .start
@@ -85,16 +86,52 @@ impl Stage {
                 let own = pairs.filter(|c| c.body1 == handle || c.body2 == handle).map(|c| -c.gap);
                 self.world.contacts_of(handle).map(|c| -c.gap).chain(own).fold(0.0, f64::max)
             }
-            Quantity::Stress => body.stresses().iter().map(DeformableStress::von_mises).fold(0.0, f64::max),
-            Quantity::Strain => {
-                let strains = body.strains().into_iter().map(|strain| {
-                    let (values, _) = DeformableStress { cauchy: strain }.principal();
-                    values.into_iter().map(f64::abs).fold(0.0, f64::max)
-                });
-                strains.fold(0.0, f64::max)
-            }
+            Quantity::Stress | Quantity::Strain => largest_of_elements(quantity, body).0,
             _ => f64::NAN,
         }
+    }
+
+    /// The largest stress or strain of a soft body, and the middle of the element that has it \[m\].
+    pub fn measure_with_place(&self, quantity: Quantity, of: &str) -> (f64, [f64; 3]) {
+        match self.thing(of) {
+            Some(Thing::Soft(body)) => largest_of_elements(quantity, &self.world.bodies[body]),
+            _ => (f64::NAN, [f64::NAN; 3]),
+        }
+    }
+
+    /// How fast the contacts between two bodies slide, the mean by their forces.
+    fn slip_speed(&self, of: &str, on: Option<&str>) -> f64 {
+        let (mut slid, mut forces) = (0.0, 0.0);
+        let mut add = |velocity: Vector, normal: Vector, force: Vector| {
+            let along = velocity - normal * velocity.dot(normal);
+            slid += f64::from(along.length() * force.length());
+            forces += f64::from(force.length());
+        };
+        let point = |body: DeformableBodyHandle, vertices: &[usize; 3], weights: &[f64; 3]| {
+            let velocity =
+                |v: &usize| self.world.bodies[body].velocity(*v).unwrap_or([0.0; 3]).map(|c| c as f32);
+            vertices.iter().zip(weights).map(|(v, w)| Vector::from(velocity(v)) * *w as f32).sum::<Vector>()
+        };
+        match (self.thing(of), on.and_then(|on| self.thing(on))) {
+            (Some(Thing::Soft(soft)), Some(Thing::Rigid(body, collider)))
+            | (Some(Thing::Rigid(body, collider)), Some(Thing::Soft(soft))) => {
+                for c in self.world.contacts_of(soft).filter(|c| c.collider == collider) {
+                    let other = self.physics.bodies[body].velocity_at_point(c.point);
+                    add(point(soft, &c.vertices, &c.weights) - other, c.normal, c.force);
+                }
+            }
+            (Some(Thing::Soft(one)), Some(Thing::Soft(other))) => {
+                let pair = [one, other];
+                let between =
+                    |c: &&DeformablePairContact| [c.body1, c.body2] == pair || [c.body2, c.body1] == pair;
+                for c in self.world.pair_contacts().iter().filter(between) {
+                    let first = point(c.body1, &c.vertices[0], &c.weights[0]);
+                    add(first - point(c.body2, &c.vertices[1], &c.weights[1]), c.normal, c.force);
+                }
+            }
+            _ => {}
+        }
+        if forces > 0.0 { slid / forces } else { 0.0 }
     }
 
     /// Degrees between the upright axis of a body and where that was at the start.
@@ -165,4 +202,24 @@ impl Stage {
 
 pub(crate) fn size([x, y, z]: [f64; 3]) -> f64 {
     x.hypot(y).hypot(z)
+}
+
+/// The largest von Mises stress or principal strain, and the middle of its tetrahedron; zero and NaN where there is none.
+fn largest_of_elements(quantity: Quantity, body: &DeformableBody) -> (f64, [f64; 3]) {
+    let principal = |strain: [[f64; 3]; 3]| {
+        let (values, _) = DeformableStress { cauchy: strain }.principal();
+        values.into_iter().map(f64::abs).fold(0.0, f64::max)
+    };
+    let values: Vec<f64> = match quantity {
+        Quantity::Stress => body.stresses().iter().map(DeformableStress::von_mises).collect(),
+        _ => body.strains().into_iter().map(principal).collect(),
+    };
+    let largest = values.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+    let Some((element, value)) = largest else { return (0.0, [f64::NAN; 3]) };
+    let mut middle = [0.0; 3];
+    for vertex in body.model().tetrahedra().nth(element).into_iter().flatten() {
+        let position = body.position(vertex as usize).unwrap_or([f64::NAN; 3]);
+        middle.iter_mut().zip(position).for_each(|(m, x)| *m += 0.25 * x);
+    }
+    (*value, middle)
 }

@@ -78,12 +78,15 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
         let said = |what: String| format!("deformable \"{name}\": {what}");
         let builder = soft::deformable(body, folder).map_err(said)?;
         let handle = stage.world.insert(builder).map_err(|e| said(e.to_string()))?;
+        if body.pinned.is_some() && stage.world.bodies[handle].pinned().len() == 0 {
+            return Err(said("`pinned`: no vertex is in its boxes".into()));
+        }
         stage.deformable.push((name.clone(), handle));
     }
     scene.attach.iter().try_for_each(|attach| stage.attach(attach))?;
     stage.add_probes(scene);
     // Last, so that joints, attachments and probes are where the file says before it is turned.
-    scene.drop.as_ref().map_or(Ok(()), |drop| stage.fall(drop))?;
+    scene.drop.as_ref().map_or(Ok(()), |drop| stage.fall(scene, drop))?;
     let names: Vec<String> = scene.names().map(String::from).collect();
     for name in names {
         let rotation = stage.rotation(&name).unwrap_or(Rotation::IDENTITY);

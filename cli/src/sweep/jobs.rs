@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 /// The file of a case that is finished: written last, and whole or not at all.
 const OUTCOME: &str = "outcome.json";
 const COSTS: &str = "costs.json";
+const REPLAY: &str = "replay.bin";
 
 /// One scene to run, into a folder.
 #[derive(Clone, Debug)]
@@ -64,6 +65,9 @@ pub fn jobs(
     out: &Path,
 ) -> Result<Vec<Job>, SceneError> {
     let job = |(k, case): (usize, Case)| {
+        if let Some((path, _)) = case.set.iter().find(|(path, _)| set.iter().any(|(own, _)| own == path)) {
+            return Err(SceneError::elsewhere(format!("--set {path}: the sweep sets it")));
+        }
         let set: Vec<_> = set.iter().chain(&case.set).cloned().collect();
         let file = SceneFile::read(path, &set)?;
         Ok(Job { file, case, folder: out.join(format!("{k:04}")) })
@@ -118,7 +122,9 @@ fn single_threaded<T: Send>(is_one_of_many: bool, what: impl FnOnce() -> T + Sen
 
 /// Runs a job, or finds that it has been run; nothing if it was stopped.
 fn finish(job: &Job, number: usize, options: &JobOptions<'_>) -> Option<Result<Done, String>> {
+    let has_replay = options.replay_rate == Some(0.0) || job.folder.join(REPLAY).exists();
     if options.resume
+        && has_replay
         && let Some(done) = finished(job)
     {
         return Some(Ok(done));
@@ -152,7 +158,7 @@ fn broken(job: &Job, panic: &(dyn std::any::Any + Send)) -> Run {
 }
 
 /// The results of an earlier run of the same scene.
-fn finished(job: &Job) -> Option<Done> {
+pub fn finished(job: &Job) -> Option<Done> {
     let (outcome, costs) = read(&job.folder).ok()?;
     (outcome.key == key(&job.file) && outcome.case == job.case.name).then(|| Done {
         outcome,
@@ -179,13 +185,15 @@ pub fn read(folder: &Path) -> Result<(Outcome, Costs), String> {
 fn write(folder: &Path, run: &Run, costs: &Costs) -> std::io::Result<()> {
     std::fs::create_dir_all(folder)?;
     // What is there is of another run from here on.
-    match std::fs::remove_file(folder.join(OUTCOME)) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
-        _ => {}
+    for old in [OUTCOME, REPLAY] {
+        match std::fs::remove_file(folder.join(old)) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
     }
     run.trace.write_csv(&folder.join("trace.csv"))?;
     if let Some(replay) = &run.replay {
-        std::fs::write(folder.join("replay.bin"), replay.to_bytes())?;
+        std::fs::write(folder.join(REPLAY), replay.to_bytes())?;
     }
     std::fs::write(folder.join(COSTS), serde_json::to_vec_pretty(costs)?)?;
     let unfinished = folder.join("outcome.unfinished");

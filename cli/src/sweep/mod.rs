@@ -5,5 +5,5 @@ mod jobs;
 mod table;
 
 pub use cases::{Case, cases};
-pub use jobs::{Done, Job, JobOptions, jobs, read, run_jobs};
+pub use jobs::{Done, Job, JobOptions, finished, jobs, read, run_jobs};
 pub use table::{Row, Summary, Table};

@@ -77,10 +77,11 @@ fn check_filter(scene: &Scene, e: &Expect) -> Result<(), Mistake> {
 /// The condition of a trigger.
 pub(super) fn check_when(scene: &Scene, when: &When, at: Range<usize>) -> Result<(), Mistake> {
     check_quantity_of(scene, *when.quantity.as_ref(), when.quantity.span(), &[&when.of], when.on.as_ref())?;
-    if *when.quantity.as_ref() == Quantity::AccelerationG {
+    if *when.quantity.as_ref() == Quantity::AccelerationG || when.quantity.as_ref().is_of_steps() {
+        let name = when.quantity.as_ref().name();
         return Err((
             at,
-            "`when`: an acceleration is known after the run only; take a `speed` or a `force`".into(),
+            format!("`when`: `{name}` is known after the run only; take a `speed` or a `force`"),
         ));
     }
     if when.at_most.is_none() && when.at_least.is_none() {
@@ -118,8 +119,12 @@ fn check_quantity_of(
         Some(on) if quantity.is_force() && !bodies.contains(&on.as_ref().as_str()) => {
             Err(unknown(on, "on", "a body", &bodies))
         }
-        None if quantity.is_force() => Err((at, "`force` needs `on`, the body that touches".into())),
-        Some(on) if !quantity.is_force() => Err((on.span(), "`on` is for the quantity `force` only".into())),
+        None if quantity.is_force() => {
+            Err((at, format!("`{}` needs `on`, the body that touches", quantity.name())))
+        }
+        Some(on) if !quantity.is_force() => {
+            Err((on.span(), "`on` is for forces and `slip_speed` only".into()))
+        }
         _ => Ok(()),
     }
 }

@@ -41,7 +41,7 @@ fn check_size(scene: &Scene) -> Result<(), Mistake> {
         let message = format!("`duration` is {steps:.0} steps of {dt} s, but {MOST_STEPS:.0} are the most");
         return Err((duration.span(), message));
     }
-    if steps < 0.5 {
+    if steps < 1.0 - 1e-6 {
         let message = format!("`duration` is {} s, which is no step of {dt} s", duration.as_ref());
         return Err((duration.span(), message));
     }
@@ -76,6 +76,18 @@ fn check_drop(scene: &Scene, drop: &Drop) -> Result<(), Mistake> {
     let bodies: Vec<&str> = rigid_names(scene).into_iter().chain(deformable_names(scene)).collect();
     if let Some(wrong) = drop.members.iter().find(|m| !bodies.contains(&m.as_ref().as_str())) {
         return Err(unknown(wrong, "members", "a body", &bodies));
+    }
+    let is_fixed =
+        |name: &str| scene.rigid.iter().any(|b| b.name.as_ref() == name && b.kind != Kind::Dynamic);
+    if let Some(wrong) = drop.members.iter().find(|m| is_fixed(m.as_ref())) {
+        return Err((wrong.span(), format!("`members` names \"{}\", which does not fall", wrong.as_ref())));
+    }
+    let [x, y, z] = scene.world.gravity;
+    if !(x == 0.0 && z == 0.0 && y < 0.0) {
+        return Err((
+            drop.height.span(),
+            format!("a drop falls along -y, but `gravity` is {:?}", scene.world.gravity),
+        ));
     }
     let (height, gap) = (*drop.height.as_ref(), *drop.gap.as_ref());
     if drop.members.is_empty() {
