@@ -40,7 +40,7 @@ fn shipped_scenes_parse() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/scenes");
     let scenes = std::fs::read_dir(folder).unwrap().filter_map(|e| Some(e.ok()?.path()));
     let scenes: Vec<_> = scenes.filter(|p| p.extension().is_some_and(|e| e == "toml")).collect();
-    assert!(scenes.len() >= 5);
+    assert!(scenes.len() >= 20);
     for path in scenes {
         let parsed = file::parse(&std::fs::read_to_string(&path).unwrap());
         assert!(parsed.is_ok(), "{}: {}", path.display(), parsed.unwrap_err());

@@ -18,6 +18,9 @@ mod report;
 mod run;
 mod sweep;
 
+use crate::baseline::Drift;
+use crate::report::to_xml;
+use crate::sweep::Done;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -178,6 +181,23 @@ fn stop_flag() -> &'static AtomicBool {
 
 fn is_stopped() -> bool {
     stop_flag().load(Ordering::Relaxed)
+}
+
+/// The exit code of runs that have so many failures.
+fn exit_code(failures: usize) -> u8 {
+    match failures {
+        _ if is_stopped() => STOPPED,
+        0 => MET,
+        _ => FAILED,
+    }
+}
+
+/// Writes JUnit's XML, if it is asked for.
+fn write_junit(path: Option<&Path>, done: &[Done], drifts: &[Vec<Drift>]) -> Result<(), String> {
+    let Some(path) = path else { return Ok(()) };
+    let runs: Vec<_> =
+        done.iter().zip(drifts).map(|(d, drifts)| (&d.outcome, &d.costs, &drifts[..])).collect();
+    std::fs::write(path, to_xml(&runs)?).map_err(|e| format!("{}: {e}", path.display()))
 }
 
 /// Threads of the machine.

@@ -1,8 +1,8 @@
 //! `foible report`.
 
 use super::drifts;
-use super::{FAILED, Format, MET};
-use crate::report::{of_drifts, of_run, of_sweep, to_xml};
+use super::{Format, exit_code, write_junit};
+use crate::report::{of_drifts, of_run, of_sweep};
 use crate::sweep::{Done, Table, read};
 use std::path::{Path, PathBuf};
 
@@ -32,11 +32,7 @@ impl Report {
             let mut all = done.iter().zip(&drifts);
             all.try_for_each(|(done, drifts)| super::run::write_page(done, drifts))?;
         }
-        if let Some(path) = &self.junit {
-            let runs: Vec<_> =
-                done.iter().zip(&drifts).map(|(d, drifts)| (&d.outcome, &d.costs, &drifts[..])).collect();
-            std::fs::write(path, to_xml(&runs)?).map_err(|e| format!("{}: {e}", path.display()))?;
-        }
+        write_junit(self.junit.as_deref(), &done, &drifts)?;
         match self.format {
             Format::Json => say!("{}", super::run::json(&done)?),
             Format::Text if is_sweep => say!("{}", of_sweep(&table).trim_end()),
@@ -46,8 +42,7 @@ impl Report {
         if !moved.is_empty() && self.format == Format::Text {
             say!("{}", of_drifts(&moved).trim_end());
         }
-        let is_failed = !moved.is_empty() || done.iter().any(|d| d.outcome.failures() > 0);
-        Ok(if is_failed { FAILED } else { MET })
+        Ok(exit_code(moved.len() + done.iter().map(|d| d.outcome.failures()).sum::<usize>()))
     }
 
     /// The results in the folder, or in the folders in it, in order.

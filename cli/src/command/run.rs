@@ -2,9 +2,9 @@
 
 use super::drifts;
 use super::progress::bar;
-use super::{Choice, FAILED, Format, MET, STOPPED, is_stopped, name_of, scene_files, stop_flag};
+use super::{Choice, Format, exit_code, name_of, scene_files, stop_flag, write_junit};
 use crate::baseline::Drift;
-use crate::report::{PageOfRun, lines, of_drifts, of_run, page_of_run, to_xml};
+use crate::report::{PageOfRun, lines, of_drifts, of_run, page_of_run};
 use crate::run::Trace;
 use crate::scene::SceneFile;
 use crate::sweep::{Case, Done, Job, JobOptions, run_jobs};
@@ -46,11 +46,7 @@ impl Run {
         for (done, drifts) in done.iter().zip(&drifts) {
             write_page(done, drifts)?;
         }
-        if let Some(path) = &self.choice.junit {
-            let runs: Vec<_> =
-                done.iter().zip(&drifts).map(|(d, drifts)| (&d.outcome, &d.costs, &drifts[..])).collect();
-            std::fs::write(path, to_xml(&runs)?).map_err(|e| format!("{}: {e}", path.display()))?;
-        }
+        write_junit(self.choice.junit.as_deref(), &done, &drifts)?;
         let failures: usize = done.iter().map(|d| d.outcome.failures()).sum::<usize>()
             + drifts.iter().map(Vec::len).sum::<usize>();
         match self.choice.format {
@@ -64,13 +60,7 @@ impl Run {
                 say!("\n{} scenes, {failures} failures", done.len());
             }
         }
-        Ok(if is_stopped() {
-            STOPPED
-        } else if failures > 0 {
-            FAILED
-        } else {
-            MET
-        })
+        Ok(exit_code(failures))
     }
 
     fn run(&self, jobs: &[Job]) -> Result<Vec<Done>, String> {

@@ -2,9 +2,9 @@
 
 use super::drifts;
 use super::progress::bar;
-use super::{Choice, FAILED, Format, MET, STOPPED, is_stopped, name_of, stop_flag, threads};
+use super::{Choice, Format, exit_code, name_of, stop_flag, threads, write_junit};
 use crate::baseline::Drift;
-use crate::report::{of_drifts, of_sweep, page_of_sweep, to_xml};
+use crate::report::{of_drifts, of_sweep, page_of_sweep};
 use crate::scene::SceneFile;
 use crate::sweep::{Done, Job, JobOptions, Table, cases, finished, jobs, run_jobs};
 use std::path::{Path, PathBuf};
@@ -51,29 +51,20 @@ impl Sweep {
         let done: Vec<Done> = all.iter().filter_map(|job| is_run(job).or_else(|| finished(job))).collect();
         let is_compared = !self.no_baseline && self.choice.set.is_empty();
         let drifts = drifts::compare(&self.scene, &done, is_compared)?;
-        write_table(&name_of(&self.scene), &Table::of(&done), &done, &self.folder())?;
-        if let Some(path) = &self.choice.junit {
-            let runs: Vec<_> =
-                done.iter().zip(&drifts).map(|(d, drifts)| (&d.outcome, &d.costs, &drifts[..])).collect();
-            std::fs::write(path, to_xml(&runs)?).map_err(|e| format!("{}: {e}", path.display()))?;
-        }
+        let table = Table::of(&done);
+        write_table(&name_of(&self.scene), &table, &done, &self.folder())?;
+        write_junit(self.choice.junit.as_deref(), &done, &drifts)?;
         let is_failed = |(done, drifts): &(&Done, &Vec<Drift>)| done.outcome.failures() + drifts.len() > 0;
         let failed = done.iter().zip(&drifts).filter(is_failed).count();
         match self.choice.format {
             Format::Json => say!("{}", super::run::json(&done)?),
-            Format::Text => self.tell(&done, &drifts, all.len(), failed),
+            Format::Text => self.tell(&table, &done, &drifts, (all.len(), failed)),
         }
-        Ok(if is_stopped() {
-            STOPPED
-        } else if failed > 0 {
-            FAILED
-        } else {
-            MET
-        })
+        Ok(exit_code(failed))
     }
 
-    fn tell(&self, done: &[Done], drifts: &[Vec<Drift>], cases: usize, failed: usize) {
-        say!("{}", of_sweep(&Table::of(done)).trim_end());
+    fn tell(&self, table: &Table, done: &[Done], drifts: &[Vec<Drift>], (cases, failed): (usize, usize)) {
+        say!("{}", of_sweep(table).trim_end());
         for (done, drifts) in done.iter().zip(drifts).filter(|(_, drifts)| !drifts.is_empty()) {
             say!("  [{}]:\n{}", done.outcome.case, of_drifts(drifts).trim_end());
         }

@@ -139,7 +139,8 @@ fn judge(
         let (value, place) = (signals.take(measure, &series), signals.place(measure, &series));
         outcome.measures.push(Measured::of(measure, value, place));
     }
-    tell_apart(outcome);
+    let verdicts = outcome.verdicts.iter_mut().map(|verdict| &mut verdict.measured);
+    tell_apart(verdicts.chain(&mut outcome.measures).map(|measured| &mut measured.name));
     for (name, body) in &stage.deformable {
         if stage.world.bodies[*body].is_quarantined() {
             let measured = Measured {
@@ -154,14 +155,13 @@ fn judge(
     outcome.finals = finals(scene, stage);
 }
 
-/// Numbers of the same name get a number behind it.
-fn tell_apart(outcome: &mut Outcome) {
+/// Names that were there before get a number behind them.
+pub(crate) fn tell_apart<'a>(names: impl Iterator<Item = &'a mut String>) {
     let mut known = std::collections::BTreeMap::new();
-    let verdicts = outcome.verdicts.iter_mut().map(|verdict| &mut verdict.measured);
-    for measured in verdicts.chain(&mut outcome.measures) {
-        let times = known.entry(measured.name.clone()).and_modify(|times| *times += 1).or_insert(1usize);
+    for name in names {
+        let times = known.entry(name.clone()).and_modify(|times| *times += 1).or_insert(1usize);
         if *times > 1 {
-            measured.name = format!("{} #{times}", measured.name);
+            *name = format!("{name} #{times}");
         }
     }
 }

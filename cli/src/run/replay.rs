@@ -66,8 +66,18 @@ pub struct Replay {
 #[derive(Clone, Debug)]
 enum Drawn {
     Rigid(RigidBodyHandle),
-    /// With the skin where the mesh is not the body's own vertices.
-    Soft(DeformableBodyHandle, Box<Option<DeformableSkin>>),
+    Soft(DeformableBodyHandle, Surface),
+}
+
+/// How the vertices of a soft mesh move.
+#[derive(Clone, Debug)]
+enum Surface {
+    /// They are these of the body.
+    Own(Vec<u32>),
+    /// They are led by it.
+    Skin(Box<DeformableSkin>),
+    /// They stay: no skin could be made.
+    Still,
 }
 
 impl Replay {
@@ -102,14 +112,15 @@ impl Replay {
         let body = &stage.world.bodies[handle];
         let model = body.model();
         let is_solid = model.sheet_triangles().next().is_none() && model.rod_segments().next().is_none();
-        let (vertices, triangles, skin) = if is_solid {
-            let (of_surface, triangles) = compact(model.surface_triangles());
+        let (vertices, triangles, surface) = if is_solid {
+            let (own, triangles) = compact(model.surface_triangles());
             let positions: Vec<[f32; 3]> = body.positions().map(|p| p.to_array()).collect();
-            (of_surface.iter().map(|v| positions[*v as usize]).collect(), triangles, None)
+            (own.iter().map(|v| positions[*v as usize]).collect(), triangles, Surface::Own(own))
         } else {
             let mesh = DeformableSurfaceMesh::new(model);
-            let skin = DeformableSkin::bind(model, &mesh.vertices, &mesh.normals).ok();
-            (mesh.vertices.iter().map(|v| v.to_array()).collect(), mesh.triangles, skin)
+            let skin = DeformableSkin::bind(model, &mesh.vertices, &mesh.normals);
+            let surface = skin.map_or(Surface::Still, |skin| Surface::Skin(Box::new(skin)));
+            (mesh.vertices.iter().map(|v| v.to_array()).collect(), mesh.triangles, surface)
         };
         self.meshes.push(ReplayMesh {
             name: name.into(),
@@ -118,7 +129,7 @@ impl Replay {
             vertices,
             triangles,
         });
-        self.bodies.push(Drawn::Soft(handle, Box::new(skin)));
+        self.bodies.push(Drawn::Soft(handle, surface));
     }
 
     /// Half the size of all that is not without end.
@@ -153,9 +164,7 @@ impl Replay {
                     let ([x, y, z], [i, j, k, w]) = (pose.translation.to_array(), pose.rotation.to_array());
                     frame.poses.push([x, y, z, i, j, k, w]);
                 }
-                Drawn::Soft(handle, skin) => {
-                    frame.add_soft(&stage.world.bodies[*handle], skin.as_ref().as_ref(), mesh)
-                }
+                Drawn::Soft(handle, surface) => frame.add_soft(&stage.world.bodies[*handle], surface, mesh),
             }
         }
         let own = stage.world.contacts().iter().map(|c| (c.point, c.force));
@@ -169,24 +178,22 @@ impl Replay {
 }
 
 impl ReplayFrame {
-    fn add_soft(&mut self, body: &DeformableBody, skin: Option<&DeformableSkin>, mesh: &ReplayMesh) {
-        let Some(skin) = skin else {
+    fn add_soft(&mut self, body: &DeformableBody, surface: &Surface, mesh: &ReplayMesh) {
+        if let Surface::Own(own) = surface {
             let positions: Vec<Vector> = body.positions().collect();
             let stresses = body.vertex_stresses();
-            let (of_surface, _) = compact(body.model().surface_triangles());
-            for v in of_surface {
-                self.vertices.push(positions[v as usize].to_array());
-                self.stresses.push(stresses[v as usize].von_mises() as f32);
-            }
+            self.vertices.extend(own.iter().map(|v| positions[*v as usize].to_array()));
+            self.stresses.extend(own.iter().map(|v| stresses[*v as usize].von_mises() as f32));
             return;
-        };
-        let count = mesh.vertices.len();
-        let (mut positions, mut normals) = (vec![Vector::ZERO; count], vec![Vector::ZERO; count]);
-        // The buffers have the length of the mesh that it was bound to.
-        if skin.update(body, &mut positions, &mut normals).is_ok() {
-            self.vertices.extend(positions.iter().map(|p| p.to_array()));
-            self.stresses.resize(self.vertices.len(), 0.0);
         }
+        let mut positions: Vec<Vector> = mesh.vertices.iter().map(|v| Vector::from(*v)).collect();
+        let mut normals = vec![Vector::ZERO; positions.len()];
+        if let Surface::Skin(skin) = surface {
+            // The buffers have the length of the mesh that it was bound to: nothing can be wrong with them.
+            let _ = skin.update(body, &mut positions, &mut normals);
+        }
+        self.vertices.extend(positions.iter().map(|p| p.to_array()));
+        self.stresses.resize(self.vertices.len(), 0.0);
     }
 }
 

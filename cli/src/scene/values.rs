@@ -152,11 +152,8 @@ pub struct Parameters {
 }
 
 /// What the parameters come to, each as a literal of TOML.
-pub type Values = Resolved;
-
-/// See [`Values`].
 #[derive(Clone, Debug, Default)]
-pub struct Resolved(BTreeMap<String, String>);
+pub struct Values(BTreeMap<String, String>);
 
 impl Parameters {
     /// Those of the scene's own file, and of included ones where it has none of the name.
@@ -197,13 +194,13 @@ impl Parameters {
     }
 
     /// Every parameter's value; those that are formulas may name others.
-    pub fn resolved(&self) -> Result<Resolved, Mistake> {
+    pub fn resolved(&self) -> Result<Values, Mistake> {
         let mut known = BTreeMap::new();
         let mut left: Vec<_> = self.texts.iter().collect();
         loop {
             let before = left.len();
             let mut mistake = None;
-            left.retain(|(name, (at, text))| match Resolved::value(text, &known) {
+            left.retain(|(name, (at, text))| match Values::value(text, &known) {
                 Ok(value) => {
                     known.insert((*name).clone(), value);
                     false
@@ -214,7 +211,7 @@ impl Parameters {
                 }
             });
             match mistake {
-                None => return Ok(Resolved(known)),
+                None => return Ok(Values(known)),
                 Some(mistake) if left.len() == before => return Err(mistake),
                 Some(_) => {}
             }
@@ -222,7 +219,7 @@ impl Parameters {
     }
 }
 
-impl Resolved {
+impl Values {
     fn value(text: &str, known: &BTreeMap<String, String>) -> Result<String, String> {
         if let Some(text) = text.strip_prefix('=') {
             return formula(text, known).map(number);

@@ -1,7 +1,7 @@
 //! The cases that a sweep has.
 
+use crate::run::tell_apart;
 use crate::scene::{Axis, Entry, Mode, Orientations, Random, Range, Scale, Sweep};
-use std::collections::BTreeMap;
 
 /// Cases of a sweep, at the most.
 const MOST_CASES: usize = 100_000;
@@ -55,13 +55,7 @@ pub fn cases(sweep: &Sweep) -> Result<Vec<Case>, String> {
     }
     let mut cases: Vec<Case> = (0..count).map(|k| case(&axes, sweep.mode, k)).collect();
     // Values that are there twice are cases of their own.
-    let mut known = BTreeMap::new();
-    for case in &mut cases {
-        let times = known.entry(case.name.clone()).and_modify(|times| *times += 1).or_insert(1usize);
-        if *times > 1 {
-            case.name = format!("{} #{times}", case.name);
-        }
-    }
+    tell_apart(cases.iter_mut().map(|case| &mut case.name));
     Ok(cases)
 }
 
