@@ -90,11 +90,11 @@ mod export;
 
 pub use body::{
     Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
-    DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableContactPartner,
-    DeformableState, DeformableStress, DeformableWind, FactorPrecision, Fidelity, Frames, Integrator,
-    JointRole, Solver, SolverSettings,
+    DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableContact,
+    DeformableContactPartner, DeformablePairContact, DeformableState, DeformableStress, DeformableWind,
+    FactorPrecision, Fidelity, Frames, Integrator, JointRole, Solver, SolverSettings,
 };
-pub use contact::DeformableSurfacePoint;
+pub use contact::{DeformableDrag, DeformableSurfacePoint};
 pub use coupling::{
     DeformableColliders, DeformableContactModificationContext, DeformableHooks, DeformablePairFilterContext,
     DeformableSolverContact, PhysicsParts,
@@ -109,10 +109,9 @@ pub use mesh::{
     MeshError, Structure, SurfaceFault, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, TetMesh,
 };
 pub use pipeline::{
-    DeformableChannelEventCollector, DeformableCollisionEvent, DeformableContact,
-    DeformableContactForceEvent, DeformableCounters, DeformableEventHandler, DeformablePairContact,
-    DeformableParameters, DeformablePipeline, DeformableRest, DeformableWorld, JointForce, RigidContact,
-    SolvedJoint,
+    DeformableChannelEventCollector, DeformableCollisionEvent, DeformableContactForceEvent,
+    DeformableCounters, DeformableEventHandler, DeformableParameters, DeformablePipeline, DeformableRest,
+    DeformableWorld, JointForce, RigidContact, SolvedJoint,
 };
 #[cfg(feature = "debug-render")]
 pub use pipeline::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};
@@ -126,13 +125,13 @@ pub mod prelude {
         DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
         DeformableChannelEventCollector, DeformableColliders, DeformableCollisionEvent, DeformableContact,
         DeformableContactForceEvent, DeformableContactModificationContext, DeformableContactPartner,
-        DeformableCounters, DeformableEventHandler, DeformableHooks, DeformableMaterial, DeformableMode,
-        DeformableModel, DeformablePairContact, DeformablePairFilterContext, DeformableParameters,
-        DeformablePipeline, DeformableRest, DeformableSkin, DeformableSolverContact, DeformableStress,
-        DeformableSurfaceMesh, DeformableSurfacePoint, DeformableWind, DeformableWorld, Elasticity,
-        FactorPrecision, Fidelity, Frames, Integrator, JointForce, JointRole, MaxwellBranch, PhysicsParts,
-        RigidContact, SolvedJoint, Solver, SolverSettings, Structure, SurfaceMesh, SurfaceRepair,
-        SystemMatrix, TetMesh,
+        DeformableCounters, DeformableDrag, DeformableEventHandler, DeformableHooks, DeformableMaterial,
+        DeformableMode, DeformableModel, DeformablePairContact, DeformablePairFilterContext,
+        DeformableParameters, DeformablePipeline, DeformableRest, DeformableSkin, DeformableSolverContact,
+        DeformableStress, DeformableSurfaceMesh, DeformableSurfacePoint, DeformableWind, DeformableWorld,
+        Elasticity, FactorPrecision, Fidelity, Frames, Integrator, JointForce, JointRole, MaxwellBranch,
+        PhysicsParts, RigidContact, SolvedJoint, Solver, SolverSettings, Structure, SurfaceMesh,
+        SurfaceRepair, SystemMatrix, TetMesh,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

@@ -27,10 +27,10 @@ promises! {
         Acceleration, FactorPrecision, Fidelity, Elasticity, DeformableBodyHandle, DeformableAttachment,
         DeformableAttachmentHandle, AttachTo, DeformableContact, DeformablePairContact, RigidContact, JointForce,
         JointRole, SolvedJoint, DeformableSurfacePoint, DeformableBodyError, BodyError, HandleError, MaterialError,
-        MeshError, DeformableContactPartner, DeformableWind, DeformableRest, DeformableMode, MaxwellBranch, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceFault, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableCollisionEvent,
+        MeshError, DeformableContactPartner, DeformableWind, DeformableRest, DeformableMode, MaxwellBranch, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceFault, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableDrag, DeformableCollisionEvent,
         DeformableContactForceEvent, DeformableChannelEventCollector, DeformableSolverContact,
         DeformablePairFilterContext<'static>, DeformableContactModificationContext<'static>;
-    is_printed: DeformableColliders, DeformableSkin, DeformableSurfaceMesh, DeformableChannelEventCollector, DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody,
+    is_printed: DeformableDrag, DeformableColliders, DeformableSkin, DeformableSurfaceMesh, DeformableChannelEventCollector, DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody,
         DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh, Structure, DeformableAttachment;
     is_cloned: DeformableSkin, DeformableSurfaceMesh, DeformableWorld, DeformableBodySet, DeformableBody, DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh,
         Structure, DeformableAttachment, AttachTo, DeformableBodyError, MeshError;

@@ -185,3 +185,111 @@ fn a_vehicle_drives_over_a_soft_kerb() {
     // Wheels of 15 cm on a kerb of 8 cm.
     assert!(highest > at.y + 0.05, "{highest} {}", at.y);
 }
+
+/// A person who stands on a mattress, pressing it or not: height of the feet, and what the floor carries.
+fn stand(weight: f32) -> (f32, f32) {
+    let (mut physics, floor) = world_with_floor(H);
+    let mut world = with_colliders();
+    let slab = mattress(&mut world);
+    let controller = KinematicCharacterController::default();
+    let capsule = Capsule::new_y(0.3, 0.2);
+    let (mut at, mut fall) = (Vector::new(1.5, 0.85, 0.0), 0.0f32);
+    for _ in 0..360 {
+        world.step(&mut physics);
+        fall -= 9.81 * H;
+        let (pose, way) = (Pose::from_translation(at), Vector::Y * fall * H);
+        let mut stands_on = None;
+        let queries = physics.query_pipeline();
+        let moved =
+            controller.move_shape(H, &queries, &capsule, &pose, way, |hit| stands_on = Some(hit.handle));
+        at += moved.translation;
+        if moved.grounded {
+            fall = 0.0;
+        }
+        let body = stands_on.and_then(|collider| world.query_colliders.as_ref()?.body(collider));
+        if let Some(body) = body {
+            let feet = at - Vector::Y * 0.5;
+            world.bodies[body].apply_impulse_on_surface(-Vector::Y * weight * H, feet, 0.2).unwrap();
+        }
+    }
+    (at.y - 0.5, world.contact_force(slab, floor).y)
+}
+
+#[test]
+fn a_characters_weight_presses_what_it_stands_on() {
+    let weight = 80.0 * 9.81;
+    let [(alone, slab), (pressed, both)] = [0.0, weight].map(stand);
+    println!("stands at {alone} without weight, {pressed} with; the floor carries {slab} N, {both} N");
+    // The floor carries both, and the mattress of 2e5 Pa gives way: on a disc of 0.2 m a half-space would by
+    // (1 - ν²)·F/(2·a·E) = 9 mm.
+    assert!((both - slab - weight).abs() < 0.02 * weight, "{slab} {both}");
+    assert!(alone - pressed > 3e-3 && alone - pressed < 0.03, "{alone} {pressed}");
+}
+
+#[test]
+fn a_vehicles_wheels_press_what_they_stand_on() {
+    let (mut physics, floor) = world_with_floor(H);
+    let mut world = with_colliders();
+    let slab = mattress(&mut world);
+    let chassis = RigidBodyBuilder::dynamic().translation(Vector::new(1.5, 0.65, 0.0)).can_sleep(false);
+    let (chassis, body) = physics.insert(chassis, ColliderBuilder::cuboid(0.5, 0.1, 0.25).density(400.0));
+    let mut vehicle = DynamicRayCastVehicleController::new(chassis);
+    vehicle.index_forward_axis = 0;
+    let tuning = WheelTuning { suspension_stiffness: 60.0, ..WheelTuning::default() };
+    for (x, z) in [(0.4, 0.25), (0.4, -0.25), (-0.4, 0.25), (-0.4, -0.25)] {
+        vehicle.add_wheel(Vector::new(x, -0.1, z), -Vector::Y, Vector::Z, 0.15, 0.15, &tuning);
+    }
+    for _ in 0..600 {
+        world.step(&mut physics);
+        let filter = QueryFilter::default().exclude_rigid_body(chassis).exclude_collider(body);
+        let dispatcher = physics.narrow_phase.query_dispatcher();
+        let (bodies, colliders) = (&mut physics.bodies, &mut physics.colliders);
+        let queries = physics.broad_phase.as_query_pipeline_mut(dispatcher, bodies, colliders, filter);
+        vehicle.update_vehicle(H, queries);
+        for wheel in vehicle.wheels() {
+            let below = wheel.raycast_info();
+            let soft = below.ground_object.and_then(|c| world.query_colliders.as_ref()?.body(c));
+            if let Some(soft) = soft {
+                let push = below.contact_normal_ws * -wheel.wheel_suspension_force * H;
+                world.bodies[soft].apply_impulse_on_surface(push, below.contact_point_ws, 0.1).unwrap();
+            }
+        }
+    }
+    let (carried, weight) = (world.contact_force(slab, floor).y, (120.0 + 40.0) * 9.81);
+    println!("the floor carries {carried} N, both weigh {weight} N");
+    // Without brakes it may roll.
+    let bounce = physics.bodies[chassis].linvel().y.abs();
+    assert!((carried - weight).abs() < 0.01 * weight && bounce < 1e-3, "{carried} {bounce}");
+}
+
+#[test]
+fn a_query_by_groups_sees_what_is_soft_and_what_is_rigid() {
+    let (mut physics, floor) = world_with_floor(H);
+    let mut world = with_colliders();
+    let in_group = |group: Group| InteractionGroups::new(group, Group::ALL, InteractionTestMode::And);
+    let cube = |x: f32, group: Group| {
+        let cube =
+            DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2; 3]).collision_groups(in_group(group));
+        cube.translation(Vector::new(x, 0.1, 0.0))
+    };
+    let [first, second] =
+        [(0.0, Group::GROUP_1), (1.0, Group::GROUP_2)].map(|(x, g)| world.insert(cube(x, g)).unwrap());
+    let rigid = ColliderBuilder::cuboid(0.1, 0.1, 0.1).collision_groups(in_group(Group::GROUP_2));
+    let (_, rigid) = physics.insert(RigidBodyBuilder::fixed().translation(Vector::new(2.0, 0.1, 0.0)), rigid);
+    physics.colliders[floor].set_collision_groups(in_group(Group::GROUP_3));
+    (0..2).for_each(|_| world.step(&mut physics));
+    let colliders = world.query_colliders.as_ref().unwrap();
+    let seen = |wanted: Group| {
+        let groups = InteractionGroups::new(Group::ALL, wanted, InteractionTestMode::And);
+        let is_meant = colliders.in_groups(&world.bodies, groups);
+        let queries = physics.query_pipeline_with_filter(QueryFilter::default().predicate(&is_meant));
+        let down =
+            |x: f32| queries.cast_ray(&Ray::new(Vector::new(x + 0.03, 2.0, 0.02), -Vector::Y), 1.95, true);
+        [0.0, 1.0, 2.0].map(|x| down(x).map(|hit| hit.0))
+    };
+    let [own1, own2] = [first, second].map(|body| colliders.collider(body));
+    assert_eq!(seen(Group::GROUP_1), [own1, None, None]);
+    assert_eq!(seen(Group::GROUP_2), [None, own2, Some(rigid)]);
+    assert_eq!(seen(Group::GROUP_3), [None; 3]);
+    assert_eq!(seen(Group::ALL), [own1, own2, Some(rigid)]);
+}

@@ -213,12 +213,76 @@ fn what_sleeps_sleeps_on() {
 }
 
 #[test]
+fn what_slept_lists_its_contacts_after_it_is_loaded_or_cloned() {
+    let (mut physics, floor) = world_with_floor(H);
+    let mut world = DeformableWorld::new();
+    let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2; 3]);
+    let cube = cube.material(DeformableMaterial::new(1e5, 0.3).mass_damping(3.0));
+    let [lower, upper] = [0.1, 0.3].map(|y| world.insert(cube.clone().translation(Vector::Y * y)).unwrap());
+    (0..300).for_each(|_| world.step(&mut physics));
+    assert!(world.bodies.iter().all(|(_, body)| body.is_sleeping()));
+    let (contacts, pairs) = (world.contacts().to_vec(), world.pair_contacts().to_vec());
+    // 8 kg on 8 kg.
+    let (all, one) = (world.contact_force(lower, floor).y, world.pair_force(upper, lower).y);
+    assert!((all - 157.0).abs() < 0.1 && (one - 78.5).abs() < 0.1, "{all} {one}");
+    let (mut loaded_physics, mut loaded) = load(&save(&physics, &world));
+    let mut cloned = world.clone();
+    for (physics, world) in [(&mut loaded_physics, &mut loaded), (&mut physics, &mut cloned)] {
+        world.step(physics);
+        assert_eq!((world.contacts(), world.pair_contacts()), (&contacts[..], &pairs[..]));
+        // Gone with what they were with.
+        world.bodies[upper].teleport(Pose::from_translation(Vector::Y)).unwrap();
+        world.step(physics);
+        assert!(world.pair_contacts().is_empty() && !world.bodies[lower].is_sleeping());
+    }
+}
+
+#[test]
+fn what_is_put_to_sleep_lists_its_contacts_after_it_is_loaded() {
+    let (mut physics, floor) = world_with_floor(H);
+    let mut world = DeformableWorld::new();
+    let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2; 3]).translation(Vector::Y * 0.1);
+    let body = world.insert(cube.material(DeformableMaterial::new(1e5, 0.3).mass_damping(3.0))).unwrap();
+    (0..20).for_each(|_| world.step(&mut physics));
+    world.bodies[body].sleep();
+    world.step(&mut physics);
+    let force = world.contact_force(body, floor);
+    assert!(world.bodies[body].is_sleeping() && force.y > 10.0);
+    let (mut physics, mut world) = load(&save(&physics, &world));
+    world.step(&mut physics);
+    assert_eq!(world.contact_force(body, floor), force);
+}
+
+#[test]
+fn text_formats_without_infinity_hold_a_world_to_the_bit() {
+    let (mut physics, mut world) = pile();
+    let colliders = DeformableColliders::new();
+    world.query_colliders = Some(colliders);
+    let handles: Vec<DeformableBodyHandle> = world.bodies.iter().map(|(handle, _)| handle).collect();
+    let held = world.bodies.attach(handles[3], &[0, 1, 2], AttachTo::World).unwrap();
+    let body = &mut world.bodies[handles[4]];
+    body.set_sleep_thresholds(f64::INFINITY, f64::NAN);
+    body.set_material(DeformableMaterial::new(2e5, 0.2).maxwell_branches([(0.5, 0.1)])).unwrap();
+    world.bodies[handles[5]].set_sleep_thresholds(f64::NAN, 1.0);
+    (0..60).for_each(|_| world.step(&mut physics));
+    let text = serde_json::to_string(&world).unwrap();
+    let mut again: DeformableWorld = serde_json::from_str(&text).unwrap();
+    let mut physics2: PhysicsWorld = postcard::from_bytes(&postcard::to_stdvec(&physics).unwrap()).unwrap();
+    assert_eq!(again.bodies.attachment(held).unwrap().break_force(), f64::INFINITY);
+    for step in 0..60 {
+        world.step(&mut physics);
+        again.step(&mut physics2);
+        assert_eq!(bits(&physics, &world), bits(&physics2, &again), "step {step}");
+    }
+}
+
+#[test]
 fn another_version_is_refused_by_name() {
     let mut bytes = postcard::to_stdvec(&DeformableBodySet::new()).unwrap();
-    assert_eq!(bytes[0], 3, "the version comes first");
+    assert_eq!(bytes[0], 4, "the version comes first");
     bytes[0] = 9;
     let refused = serde_error(&bytes);
-    assert!(refused.contains("version 9") && refused.contains("version 3"), "{refused}");
+    assert!(refused.contains("version 9") && refused.contains("version 4"), "{refused}");
 }
 
 /// Postcard keeps no messages: read by a format that does.

@@ -11,20 +11,31 @@ use std::time::Duration;
 
 const RATE: f32 = 60.0;
 
-fn app_with(rapier: RapierPhysicsPlugin<()>, mode: TimestepMode, rate: f32) -> App {
+/// Further plugins go in before it is finished.
+fn unfinished(rapier: RapierPhysicsPlugin<()>, mode: TimestepMode, rate: f32) -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default())).init_asset::<Mesh>();
     // Before rapier's plugin: the order does not matter.
     app.add_plugins((DeformablePhysicsPlugin::<NoUserData>::default(), rapier));
     app.insert_resource(mode);
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(1.0 / rate)));
+    app
+}
+
+fn finished(mut app: App) -> App {
     app.finish();
     app.cleanup();
     app
 }
 
+fn app_with(rapier: RapierPhysicsPlugin<()>, mode: TimestepMode, rate: f32) -> App {
+    finished(unfinished(rapier, mode, rate))
+}
+
+const FIXED: TimestepMode = TimestepMode::Fixed { dt: 1.0 / RATE, substeps: 1 };
+
 fn app() -> App {
-    app_with(RapierPhysicsPlugin::default(), TimestepMode::Fixed { dt: 1.0 / RATE, substeps: 1 }, RATE)
+    app_with(RapierPhysicsPlugin::default(), FIXED, RATE)
 }
 
 fn jelly() -> DeformableMaterial {
@@ -381,4 +392,41 @@ fn paused_and_collision_only_contexts_stand_still() {
         updates(&mut app, 10);
         assert_eq!(place(&app, soft), before);
     }
+}
+
+/// Ends of the lines that are drawn in a frame.
+#[cfg(feature = "gizmos")]
+fn drawn(app: &mut App) -> Vec<Vec3> {
+    updates(app, 2);
+    let assets = app.world().resource::<Assets<GizmoAsset>>();
+    assets.iter().flat_map(|(_, asset)| asset.buffer().list_positions.to_vec()).collect()
+}
+
+#[cfg(feature = "gizmos")]
+#[test]
+fn gizmos_are_the_lines_of_the_debug_renderer_and_can_be_turned_off() {
+    use bevy::gizmos::GizmoPlugin;
+    use bevy_rapier3d::rapier::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
+    struct Ends(Vec<Vec3>);
+    impl DebugRenderBackend for Ends {
+        fn draw_line(&mut self, _: DebugRenderObject, a: Vec3, b: Vec3, _: DebugColor) {
+            self.0.extend([a, b]);
+        }
+    }
+    let mut app = unfinished(RapierPhysicsPlugin::default(), FIXED, RATE);
+    // Skeletons, which the gizmos of skinned meshes look for.
+    app.init_asset::<bevy::mesh::skinning::SkinnedMeshInverseBindposes>();
+    app.add_plugins((GizmoPlugin, DeformableDebugRenderPlugin));
+    let mut app = finished(app);
+    floor(&mut app);
+    app.world_mut()
+        .spawn((Deformable::new(cube().pinned(|x| x.x < -0.19)), Transform::from_xyz(0.0, 0.19, 0.0)));
+    updates(&mut app, 60);
+    let lines = drawn(&mut app);
+    let mut expected = Ends(Vec::new());
+    foible3d::DeformableDebugRenderPipeline::default().render(&mut expected, &deformables(&mut app).world);
+    // Edges of the surface, arrows of the floor's forces, crosses of pins.
+    assert!(lines.len() > 2 * 48 && lines == expected.0, "{} {}", lines.len(), expected.0.len());
+    app.world_mut().resource_mut::<DeformableDebugRenderSettings>().enabled = false;
+    assert!(drawn(&mut app).is_empty());
 }

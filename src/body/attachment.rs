@@ -28,6 +28,7 @@ pub struct DeformableAttachment {
     pub(crate) anchors: Anchors,
     compliance: f64,
     length: f64,
+    #[cfg_attr(feature = "serde-serialize", serde(with = "crate::math::finite_or_none"))]
     break_force: f64,
     pub(crate) force: Vec3,
     pub(crate) broken: bool,

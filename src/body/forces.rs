@@ -102,6 +102,49 @@ impl DeformableBody {
         self.hit(gains.into_iter().enumerate())
     }
 
+    /// Applies an impulse [N s] to the surface around a `point` of the world \[m\], where a foot or a wheel presses: shared by the
+    /// vertices of the surface within `radius` \[m\] by their areas times 1 − (distance/radius)². A radius of less than 1.5 times
+    /// the distance of the nearest one is taken as that.
+    ///
+    /// ```
+    /// use foible3d::prelude::*;
+    /// use rapier3d::prelude::*;
+    /// let mut pad = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.1, 0.5), [10, 2, 10]).build()?;
+    /// let (weight, dt) = (80.0 * 9.81, 1.0 / 60.0);
+    /// pad.apply_impulse_on_surface(-Vector::Y * weight * dt, Vector::Y * 0.1, 0.15)?;
+    /// assert!((pad.linvel()[1] * pad.mass() + 80.0 * 9.81 / 60.0).abs() < 1.0e-5);
+    /// # Ok::<(), DeformableBodyError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`BodyError::NotFinite`]; the radius as the first component of a vector. [`BodyError::NoVertices`] of a body without
+    /// a surface.
+    pub fn apply_impulse_on_surface(
+        &mut self,
+        impulse: Vector,
+        point: Vector,
+        radius: f32,
+    ) -> Result<(), BodyError> {
+        let (impulse, point) = (finite("impulse", impulse)?, finite("point", point)?);
+        let radius = finite("radius", Vector::new(radius, 0.0, 0.0))?.x;
+        let distances: Vec<f64> = (0..self.vertex_count())
+            .map(|vertex| Ok((Vec3::from(self.position(vertex)?) - point).norm()))
+            .collect::<Result<_, BodyError>>()?;
+        let areas = self.vertex_areas();
+        let on_surface = distances.iter().zip(&areas).filter(|(_, area)| **area > 0.0);
+        let nearest = on_surface.map(|(distance, _)| *distance).fold(f64::INFINITY, f64::min);
+        if !nearest.is_finite() {
+            return Err(BodyError::NoVertices { quantity: "impulse" });
+        }
+        // A vertex at the point itself has all of it.
+        let radius = radius.max(1.5 * nearest).max(f64::MIN_POSITIVE.sqrt());
+        let share = |(distance, area): (&f64, &f64)| area * (1.0 - (distance / radius).powi(2)).max(0.0);
+        let shares: Vec<f64> = distances.iter().zip(&areas).map(share).collect();
+        let (total, masses) = (shares.iter().sum::<f64>(), self.masses()?);
+        let gains = shares.iter().zip(masses).map(|(share, mass)| impulse * (share / (total * mass)));
+        self.hit(gains.enumerate())
+    }
+
     /// Applies an angular impulse [N m s] to the whole body, as to a rigid body.
     ///
     /// # Errors

@@ -5,6 +5,7 @@
 //! nodes are renumbered for locality, and only the model translates.
 
 mod constraint_memory;
+mod contacts;
 mod factor_base;
 mod handle;
 mod impact;
@@ -45,12 +46,13 @@ pub(crate) use constraint_memory::{
     AttachmentAxis, AttachmentDirection, ConstraintGeometry, ConstraintKey, ConstraintMemory, Feature,
     JointAxis, ObstacleContact, RigidPairContact, SoftPairContact, SoftPairKind,
 };
+pub use contacts::{DeformableContact, DeformablePairContact};
 pub use handle::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableContactPartner};
 pub(crate) use impact::{Impact, Partner};
 pub use set::DeformableBodySet;
 pub use settings::{Acceleration, FactorPrecision, Fidelity, Frames, Integrator, Solver, SolverSettings};
 pub use state::DeformableState;
-pub(crate) use state::{History, Surroundings, is_number};
+pub(crate) use state::{History, Sleep, Surroundings, is_number};
 pub use stress::DeformableStress;
 pub(crate) use touching::TouchKey;
 pub use wind::DeformableWind;

@@ -56,7 +56,8 @@ impl DeformableBody {
     /// asleep. At speeds of zero and less, and NaN, it never does.
     pub fn set_sleep_thresholds(&mut self, speed: f64, time: f64) {
         self.wake_up();
-        self.sleep_speed = speed;
+        // Without NaN and infinity, which text formats do not have.
+        self.sleep_speed = if speed.is_nan() { 0.0 } else { speed.min(f64::MAX) };
         self.time_until_sleep = if time.is_nan() { f64::INFINITY } else { time.max(0.0) };
     }
 

@@ -23,7 +23,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 /// Of what is written. Another one is refused: numbers of another layout would be read as something else.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// Comes first, so that nothing of another version is read.
 #[derive(Serialize)]
@@ -70,6 +70,7 @@ struct BodyRecord {
     enabled: bool,
     can_sleep: bool,
     sleep_speed: f64,
+    #[serde(with = "crate::math::finite_or_none")]
     time_until_sleep: f64,
     self_contact: bool,
     collision_groups: InteractionGroups,

@@ -1,6 +1,7 @@
 //! What changes while a body moves.
 
 use super::constraint_memory::{ConstraintKey, ConstraintMemory};
+use super::contacts::{DeformableContact, DeformablePairContact};
 use super::factor_base::FactorBase;
 use super::handle::DeformableBodyHandle;
 use super::impact::{Impact, Partner};
@@ -86,6 +87,10 @@ pub(crate) struct Sleep {
     /// Rigid bodies that slept on a body that does so no more, for the next step to wake: what it carried may have nothing
     /// below it.
     pub released: Vec<RigidBodyHandle>,
+    /// With which it fell asleep: they stay what `contacts` lists.
+    pub contacts: Vec<DeformableContact>,
+    /// Of which it is the first body.
+    pub pair_contacts: Vec<DeformablePairContact>,
 }
 
 /// What was around a body when it fell asleep: whatever differs wakes it.
@@ -151,6 +156,11 @@ impl DeformableState {
         };
         if !memories().flatten().all(is_memory) {
             return Err("a contact is not one of its mesh");
+        }
+        let slept_on = self.sleep.contacts.iter().map(|c| &c.vertices);
+        let slept_with = self.sleep.pair_contacts.iter().map(|c| &c.vertices[0]);
+        if slept_on.chain(slept_with).flatten().any(|vertex| *vertex >= nodes) {
+            return Err("a contact with which it fell asleep is not one of its mesh");
         }
         let numbers = |i: &Impact| [i.approach, i.stored, i.most_stored, i.left];
         if !self.impacts.iter().flat_map(numbers).all(f64::is_finite) {

@@ -39,10 +39,13 @@ mod tunnelling_stop;
 mod nearest_facet;
 mod queries;
 
+mod drag;
+
 pub(crate) use box_tree::BoxTree;
 pub(crate) use candidates::Candidates;
 pub(crate) use constraint::{Constraint, Endpoint, Law};
 pub(crate) use detection::{Detector, STATIC_MARGIN};
+pub use drag::DeformableDrag;
 pub(crate) use nearest_facet::{NearestFacet, nearest_weights};
 pub(crate) use obstacle::{Obstacle, ProxyId};
 pub(crate) use pair_scene::Pair;

@@ -13,12 +13,31 @@ use std::collections::BTreeMap;
 /// Colliders with the shapes of deformable bodies, in rapier's own set: for its rays and shape casts, character
 /// controllers and ray-cast vehicles. They touch nothing; contacts with deformable bodies are not theirs.
 ///
-/// They belong to no collision group: filter by predicate, or by [`DeformableColliders::body`], not by groups. Rapier's
+/// They belong to no collision group: for queries by groups take [`DeformableColliders::in_groups`] as the predicate. Rapier's
 /// queries see them from the step on that follows the first update; surfaces of solids have an inside.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde-serialize", serde(from = "Listed", into = "Listed"))]
 pub struct DeformableColliders {
     of_body: BTreeMap<DeformableBodyHandle, ColliderHandle>,
+}
+
+/// As they are saved: text formats have maps by strings only.
+#[cfg(feature = "serde-serialize")]
+type Listed = Vec<(DeformableBodyHandle, ColliderHandle)>;
+
+#[cfg(feature = "serde-serialize")]
+impl From<Listed> for DeformableColliders {
+    fn from(listed: Listed) -> Self {
+        Self { of_body: listed.into_iter().collect() }
+    }
+}
+
+#[cfg(feature = "serde-serialize")]
+impl From<DeformableColliders> for Listed {
+    fn from(colliders: DeformableColliders) -> Self {
+        colliders.of_body.into_iter().collect()
+    }
 }
 
 /// What touches nothing.
@@ -47,6 +66,40 @@ impl DeformableColliders {
     /// The body of a collider.
     pub fn body(&self, collider: ColliderHandle) -> Option<DeformableBodyHandle> {
         self.of_body.iter().find(|(_, own)| **own == collider).map(|(body, _)| *body)
+    }
+
+    /// A predicate for `QueryFilter` in the place of its `groups`, that holds for what is soft as well: whether a body's collision
+    /// groups, or a collider's own, interact with these.
+    ///
+    /// ```
+    /// use foible3d::prelude::*;
+    /// use rapier3d::prelude::*;
+    /// let (mut physics, mut deformables) = (PhysicsWorld::new(), DeformableWorld::new());
+    /// deformables.query_colliders = Some(DeformableColliders::new());
+    /// let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2; 3]);
+    /// let props = InteractionGroups::new(Group::GROUP_2, Group::ALL, InteractionTestMode::And);
+    /// deformables.insert(cube.collision_groups(props))?;
+    /// (0..2).for_each(|_| deformables.step(&mut physics));
+    /// let ray = Ray::new(Vector::new(0.03, 1.0, 0.02), -Vector::Y);
+    /// let seen = |wanted: Group| {
+    ///     let groups = InteractionGroups::new(Group::ALL, wanted, InteractionTestMode::And);
+    ///     let colliders = deformables.query_colliders.as_ref().unwrap();
+    ///     let is_meant = colliders.in_groups(&deformables.bodies, groups);
+    ///     let filter = QueryFilter::default().predicate(&is_meant);
+    ///     physics.query_pipeline_with_filter(filter).cast_ray(&ray, 10.0, true).is_some()
+    /// };
+    /// assert!(seen(Group::GROUP_2) && !seen(Group::GROUP_1));
+    /// # Ok::<(), DeformableBodyError>(())
+    /// ```
+    pub fn in_groups<'a>(
+        &'a self,
+        deformables: &'a DeformableBodySet,
+        groups: InteractionGroups,
+    ) -> impl Fn(ColliderHandle, &Collider) -> bool + 'a {
+        move |handle, collider| {
+            let soft = is_for_queries(collider).then(|| deformables.get(self.body(handle)?)).flatten();
+            soft.map_or(collider.collision_groups(), DeformableBody::collision_groups).test(groups)
+        }
     }
 
     /// Makes colliders for new bodies and gives all of them the shapes of now: between

@@ -7,6 +7,8 @@ mod vectorized;
 pub(crate) use vectorized::vectorized;
 
 pub(crate) mod dense;
+#[cfg(feature = "serde-serialize")]
+pub(crate) mod finite_or_none;
 pub(crate) mod lanes;
 pub(crate) mod polar;
 mod rigid_motion;

@@ -1,53 +1,9 @@
-//! Contacts as users read them.
+//! Contacts and joints of rigid bodies as users read them.
 
-use crate::body::{DeformableBodyHandle, JointRole};
+use crate::body::JointRole;
 use rapier3d::dynamics::{ImpulseJointHandle, RigidBodyHandle};
 use rapier3d::geometry::ColliderHandle;
 use rapier3d::math::Vector;
-
-/// A point where a deformable body touched a collider in the last step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct DeformableContact {
-    /// The deformable body.
-    pub body: DeformableBodyHandle,
-    /// The collider.
-    pub collider: ColliderHandle,
-    /// Point on the collider at the start of the step \[m\].
-    pub point: Vector,
-    /// Unit normal, from the collider to the body.
-    pub normal: Vector,
-    /// Force on the body \[N\]; the collider got the opposite.
-    pub force: Vector,
-    /// Distance along the normal at the end of the step \[m\]; negative is penetration.
-    pub gap: f64,
-    /// Vertices of the body that the force acts on.
-    pub vertices: [usize; 3],
-    /// Their shares of it; they sum to one.
-    pub weights: [f64; 3],
-}
-
-/// A point where two deformable bodies touched in the last step, or one touched itself.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct DeformablePairContact {
-    /// The first body.
-    pub body1: DeformableBodyHandle,
-    /// The second body; the same one if it touches itself.
-    pub body2: DeformableBodyHandle,
-    /// Point on the first body at the end of the step \[m\].
-    pub point: Vector,
-    /// Unit normal, from the second body to the first.
-    pub normal: Vector,
-    /// Force on the first body \[N\]; the second got the opposite.
-    pub force: Vector,
-    /// Distance along the normal at the end of the step \[m\]; negative is penetration.
-    pub gap: f64,
-    /// Vertices of the first body that the force acts on, and of the second.
-    pub vertices: [[usize; 3]; 2],
-    /// Their shares of it; they sum to one for each body.
-    pub weights: [[f64; 3]; 2],
-}
 
 /// A contact between two rigid bodies that the last step solved, because one of them is touched by a
 /// deformable body, or holds one that is. What rapier's own contact then shows is its remainder.

@@ -14,7 +14,7 @@ mod debug_render;
 mod statics;
 mod world;
 
-pub use contacts::{DeformableContact, DeformablePairContact, JointForce, RigidContact, SolvedJoint};
+pub use contacts::{JointForce, RigidContact, SolvedJoint};
 #[cfg(feature = "debug-render")]
 pub use debug_render::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};
 pub use events::{

@@ -1,10 +1,10 @@
 //! The pipeline as games with their own loop call it.
 
-use super::contacts::{DeformableContact, DeformablePairContact, JointForce, RigidContact};
+use super::contacts::{JointForce, RigidContact};
 use super::events::{DeformableCollisionEvent, DeformableContactForceEvent, DeformableEventHandler};
 use super::parameters::{DeformableCounters, DeformableParameters};
 use super::step::StepScratch;
-use crate::body::{DeformableBodySet, Integrator};
+use crate::body::{DeformableBodySet, DeformableContact, DeformablePairContact, Integrator};
 use crate::coupling::{DeformableHooks, PhysicsParts};
 use crate::error::DeformableBodyError;
 use crate::solver::{FactorKey, SECOND_ORDER, alpha_step};

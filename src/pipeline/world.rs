@@ -1,10 +1,13 @@
 //! Deformable bodies beside a rapier `PhysicsWorld`.
 
-use super::contacts::{DeformableContact, DeformablePairContact, RigidContact, SolvedJoint};
+use super::contacts::{RigidContact, SolvedJoint};
 use super::events::{DeformableCollisionEvent, DeformableContactForceEvent, DeformableEventHandler};
 use super::parameters::{DeformableCounters, DeformableParameters};
 use super::pipeline::DeformablePipeline;
-use crate::body::{DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet};
+use crate::body::{
+    DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableContact,
+    DeformablePairContact,
+};
 use crate::coupling::{DeformableColliders, DeformableHooks, PhysicsParts};
 use crate::error::DeformableBodyError;
 use rapier3d::geometry::ColliderHandle;
@@ -124,8 +127,7 @@ impl DeformableWorld {
         self.pipeline.contact_force_events()
     }
 
-    /// Contacts of the last step; of sleeping bodies those with which they fell asleep, but for worlds that were loaded or
-    /// cloned since.
+    /// Contacts of the last step; of sleeping bodies those with which they fell asleep.
     ///
     /// ```
     /// use foible3d::prelude::*;
@@ -197,9 +199,10 @@ impl DeformableWorld {
         let mut tractions = vec![[0.0; 3]; areas.len()];
         let mut add = |vertices: &[usize; 3], weights: &[f64; 3], force: Vector| {
             for (vertex, weight) in vertices.iter().zip(weights) {
-                if areas[*vertex] > 0.0 {
-                    let share = weight / areas[*vertex];
+                // Contacts of a damaged snapshot may name any vertex.
+                if let Some(area) = areas.get(*vertex).filter(|area| **area > 0.0) {
                     let own = tractions[*vertex].iter_mut().zip(force.to_array());
+                    let share = weight / area;
                     own.for_each(|(t, f)| *t += f64::from(f) * share);
                 }
             }

@@ -1,5 +1,6 @@
 //! What there is around the bodies: obstacles, contacts, attachments, and what else holds the rigid bodies.
 
+use super::finish::keep_contacts;
 use super::quarantine::quarantine;
 use super::scratch::StepScratch;
 use super::work::BodyWork;
@@ -20,6 +21,7 @@ impl StepScratch {
 
     pub(super) fn wake(&mut self, deformables: &mut DeformableBodySet, context: &StepContext<'_>) {
         self.sleeping.wake(deformables, &self.scene, &self.candidates, context);
+        keep_contacts(&self.sleeping.asked, &self.contacts, &self.pair_contacts, deformables);
     }
 
     /// Adds the bodies that are awake to the step; `recovery` \[m\] is how far overlaps are undone in it.

@@ -2,14 +2,12 @@
 
 use super::scratch::StepScratch;
 use crate::body::{
-    DeformableBody, DeformableBodyHandle, DeformableBodySet, DeformableContactPartner as Partner,
-    Partner as ConstraintPartner, TouchKey,
+    DeformableBody, DeformableBodyHandle, DeformableBodySet, DeformableContact,
+    DeformableContactPartner as Partner, DeformablePairContact, Partner as ConstraintPartner, TouchKey,
 };
 use crate::contact::overlaps;
 use crate::coupling::{HookedPair, StepContext, packed, pose_of};
-use crate::pipeline::{
-    DeformableCollisionEvent, DeformableContact, DeformableContactForceEvent, DeformablePairContact,
-};
+use crate::pipeline::{DeformableCollisionEvent, DeformableContactForceEvent};
 use parry3d::bounding_volume::BoundingVolume;
 use rapier3d::geometry::{ColliderSet, CollisionEventFlags};
 use rapier3d::math::Vector;

@@ -6,7 +6,8 @@ use super::scratch::StepScratch;
 use super::sleeping::LookAround;
 use super::work::IslandWork;
 use crate::body::{
-    DeformableAttachment, DeformableBody, DeformableBodySet, DeformableState, Integrator, is_number,
+    DeformableAttachment, DeformableBody, DeformableBodyHandle, DeformableBodySet, DeformableContact,
+    DeformablePairContact, DeformableState, Integrator, is_number,
 };
 use crate::coupling::StepContext;
 use crate::pipeline::DeformableCounters;
@@ -68,6 +69,8 @@ impl StepScratch {
             }
             let around = LookAround { scene: &self.scene, candidates: &self.candidates, context };
             self.sleeping.fall_asleep(island, &self.slept, deformables, &around);
+            self.slept.retain(|handle| deformables.get(*handle).is_some_and(DeformableBody::is_sleeping));
+            keep_contacts(&self.slept, &self.contacts, &self.pair_contacts, deformables);
         }
     }
 }
@@ -122,6 +125,25 @@ pub(super) fn store(
     body.report.guard_retries = problem.guard_retries;
     counters.guard_retries += problem.guard_retries;
     counters.not_converged += usize::from(!body.last_converged());
+}
+
+/// Lets bodies that have fallen asleep keep the contacts that they did so with.
+pub(super) fn keep_contacts(
+    handles: &[DeformableBodyHandle],
+    contacts: &[DeformableContact],
+    pair_contacts: &[DeformablePairContact],
+    deformables: &mut DeformableBodySet,
+) {
+    for handle in handles {
+        // What was moved before it was put to sleep remembers none.
+        let remembers = |body| deformables.get(body).is_some_and(|b| !b.state.contacts.is_empty());
+        let own = contacts.iter().filter(|c| c.body == *handle && remembers(c.body));
+        let pairs = pair_contacts.iter().filter(|c| c.body1 == *handle);
+        let pairs = pairs.filter(|c| remembers(c.body1) || remembers(c.body2));
+        let (own, pairs) = (own.copied().collect(), pairs.copied().collect());
+        let Some(body) = deformables.get_mut(*handle) else { continue };
+        (body.state.sleep.contacts, body.state.sleep.pair_contacts) = (own, pairs);
+    }
 }
 
 /// Gives attachments the forces with which they lead nodes of a body.

@@ -2,12 +2,13 @@
 
 use super::work::IslandWork;
 use crate::body::{
-    ConstraintKey, DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet, JointRole,
+    ConstraintKey, DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet, DeformableContact,
+    DeformablePairContact, JointRole,
 };
 use crate::contact::Endpoint;
 use crate::coupling::{body_handle, collider_handle, impulse_joint_handle};
 use crate::math::{Vec3, to_real};
-use crate::pipeline::{DeformableContact, DeformablePairContact, JointForce, RigidContact, SolvedJoint};
+use crate::pipeline::{JointForce, RigidContact, SolvedJoint};
 use crate::solver::ContactResult;
 
 /// Gives attachments the forces of their constraints.

@@ -1,7 +1,7 @@
 //! The verbs in their order.
 
 use super::scratch::StepScratch;
-use crate::body::{DeformableBody, DeformableBodySet};
+use crate::body::{DeformableBody, DeformableBodySet, Sleep};
 use crate::coupling::{DeformableHooks, PhysicsParts, StepContext};
 use crate::math::from_real;
 use crate::pipeline::{DeformableCounters, DeformableParameters};
@@ -56,7 +56,7 @@ impl StepScratch {
         self.predict(deformables, context, limits.recovery_speed * context.h);
         self.detect(deformables, context, 0);
         self.detect_soft_pairs(deformables, context);
-        self.keep_contacts_of_sleepers(deformables, context.sets.colliders);
+        self.list_contacts_of_sleepers(deformables, context.sets.colliders);
         self.attach(deformables, context);
         self.walk_neighbourhood(context, parameters.neighbourhood_bodies);
         self.counters.detection_time = clock.lap();
@@ -74,15 +74,15 @@ impl StepScratch {
     }
 
     /// What touches a sleeping body goes on to do so.
-    fn keep_contacts_of_sleepers(&mut self, deformables: &DeformableBodySet, colliders: &ColliderSet) {
-        let asleep = |body| deformables.get(body).filter(|body| body.is_sleeping());
-        // What was moved before it was put to sleep remembers none.
-        let remembers = |body: &DeformableBody| !body.state.contacts.is_empty();
+    fn list_contacts_of_sleepers(&mut self, deformables: &DeformableBodySet, colliders: &ColliderSet) {
+        self.contacts.clear();
+        self.pair_contacts.clear();
         let is_there = |collider| colliders.get(collider).is_some_and(|c| c.is_enabled());
-        self.contacts.retain(|c| asleep(c.body).is_some_and(remembers) && is_there(c.collider));
-        self.pair_contacts.retain(|c| match (asleep(c.body1), asleep(c.body2)) {
-            (Some(a), Some(b)) => remembers(a) || remembers(b),
-            _ => false,
-        });
+        let sleeps = |body| deformables.get(body).is_some_and(DeformableBody::is_sleeping);
+        for (_, body) in deformables.iter().filter(|(_, body)| body.is_sleeping()) {
+            let Sleep { contacts, pair_contacts, .. } = &body.state.sleep;
+            self.contacts.extend(contacts.iter().filter(|c| is_there(c.collider)));
+            self.pair_contacts.extend(pair_contacts.iter().filter(|c| sleeps(c.body2)));
+        }
     }
 }

@@ -5,12 +5,11 @@ use super::islands::Grouping;
 use super::sleeping::Sleeping;
 use super::soft_pairs::SoftPairDetection;
 use super::work::{BodyWork, IslandWork};
-use crate::body::{DeformableBodyHandle, PrescribedNode};
+use crate::body::{DeformableBodyHandle, DeformableContact, DeformablePairContact, PrescribedNode};
 use crate::contact::{Candidates, Constraint, ProxyId};
 use crate::coupling::{RapierScene, Reactions, RigidNeighbourhood};
 use crate::pipeline::{
-    DeformableCollisionEvent, DeformableContact, DeformableContactForceEvent, DeformableCounters,
-    DeformablePairContact, JointForce, RigidContact,
+    DeformableCollisionEvent, DeformableContactForceEvent, DeformableCounters, JointForce, RigidContact,
 };
 use crate::solver::{FactorCache, Reaction};
 use std::collections::HashMap;

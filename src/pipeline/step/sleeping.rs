@@ -21,6 +21,8 @@ pub(super) struct Sleeping {
     near: Vec<u32>,
     now: Surroundings,
     wake: Vec<DeformableBodyHandle>,
+    /// Bodies that fall asleep at the start of this step, as their users have asked for.
+    pub asked: Vec<DeformableBodyHandle>,
     /// Rigid bodies that fall asleep with the soft ones in this step.
     pub rigid: Vec<RigidBodyHandle>,
 }
@@ -108,8 +110,10 @@ impl Sleeping {
     /// wakes them when it goes.
     fn put_to_sleep(&mut self, deformables: &mut DeformableBodySet, around: &LookAround<'_>) {
         let asked = deformables.iter().filter(|(_, body)| body.is_enabled() && body.is_asked_to_sleep());
-        let asked: Vec<DeformableBodyHandle> = asked.map(|(handle, _)| handle).collect();
-        for handle in asked {
+        self.asked.clear();
+        self.asked.extend(asked.map(|(handle, _)| handle));
+        for k in 0..self.asked.len() {
+            let handle = self.asked[k];
             let name = |handle: DeformableBodyHandle| Partner::Soft(packed(handle.into_raw_parts()));
             let touches = |body: &DeformableBody, partner: Partner| {
                 body.state
