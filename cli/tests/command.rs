@@ -76,6 +76,15 @@ fn what_is_wrong_is_said_with_its_place() {
         (vec!["run", &scene, "--set", "dt=3"], "is no parameter"),
         (vec!["run", &scene, "--set", "world.dt=\"5 parsec\""], "is no unit"),
         (vec!["run", &scene, "--set", "deformable.cude.material.density=3"], "there is no `deformable.cude`"),
+        (
+            vec!["run", &scene, "--set", "rigid.sticky.translation.w=3"],
+            "there is no `rigid.sticky.translation.w`",
+        ),
+        (
+            vec!["run", &scene, "--set", "rigid.sticky.translation.3=3"],
+            "there is no `rigid.sticky.translation.3`",
+        ),
+        (vec!["run", &scene, "--set", "rigid.sticky=3"], "name what is in it"),
         (vec!["sweep", &scene], "has no [sweep]"),
         (vec!["replay", &scene], "--png"),
         (vec!["report", "."], "there are no results"),
@@ -187,6 +196,42 @@ fn results_are_of_the_last_run_only() {
     let output = common::foible(&folder, &[&["run", "cube.toml", "--out", "out"][..], &twice].concat());
     let read: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(read[0]["outcome"]["steps"], 5);
+}
+
+/// One number of a vector is set by its place or its axis, in a sweep too; what is not there is a mistake.
+#[test]
+fn numbers_of_vectors_are_set_by_place_and_axis() {
+    let folder = folder("vectors");
+    let text = "world = { duration = 0.1, dt = 0.01, gravity = [0, 0, 0] }\n\
+        rigid = [{ name = \"a\", kind = \"dynamic\", shape = { ball = { radius = 0.1 } }, linvel = [1, \"=2*1\", 3] }]\n\
+        measure = [{ name = \"x\", quantity = \"x\", of = \"a\" }, { name = \"y\", quantity = \"y\", of = \"a\" }]\n\
+        sweep = { over = { \"rigid.a.linvel.x\" = [4, 5] } }\n";
+    std::fs::write(folder.join("a.toml"), text).unwrap();
+    let numbers = |set: &str| {
+        let output = common::foible(&folder, &["run", "a.toml", "--set", set, "--format", "json"]);
+        let read: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        [0, 1].map(|k| (read[0]["outcome"]["measures"][k]["value"].as_f64().unwrap() * 100.0).round())
+    };
+    assert_eq!(numbers("rigid.a.linvel.x=5"), [50.0, 20.0]);
+    assert_eq!(numbers("rigid.a.linvel.1=5"), [10.0, 50.0]);
+    assert_eq!(numbers("rigid.0.linvel.y=\"0.6 m\""), [10.0, 6.0]);
+    foible_exits(&folder, &["sweep", "a.toml", "--out", "out"], 0);
+    let cases = std::fs::read_to_string(folder.join("out/cases.csv")).unwrap();
+    assert_eq!(cases.lines().count(), 3, "{cases}");
+}
+
+/// A mesh beside the scene's folder is named from there.
+#[test]
+fn a_new_scene_names_its_mesh_from_its_own_folder() {
+    let folder = folder("beside");
+    std::fs::create_dir_all(folder.join("parts")).unwrap();
+    std::fs::create_dir_all(folder.join("scenes")).unwrap();
+    let corners = ["0 0 0", "1 0 0", "0 1 0", "0 0 1"].map(|v| format!("v {v}\n")).concat();
+    std::fs::write(folder.join("parts/tip.obj"), corners + "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n").unwrap();
+    foible_exits(&folder, &["new", "scenes/drop.toml", "--mesh", "parts/tip.obj", "--scale", "0.1"], 0);
+    let text = std::fs::read_to_string(folder.join("scenes/drop.toml")).unwrap();
+    assert!(text.contains("path = \"../parts/tip.obj\""), "{text}");
+    foible_exits(&folder, &["check", "scenes/drop.toml"], 0);
 }
 
 /// Baselines of cases are compared by sweeps too, reports keep what has moved, and tables all that is there.

@@ -84,3 +84,28 @@ fn a_sweep_that_is_killed_goes_on_where_it_was() {
     let said = foible_exits(&folder, &["sweep", "drop.toml", "--jobs", "2", "--out", "out"], 0);
     assert!(said.contains("18 of 18 cases, 0 of them were there already"), "{said}");
 }
+
+/// Written by this crate, read by pyarrow, which python3 has to find.
+#[test]
+#[ignore = "slow: needs python with pyarrow"]
+fn an_independent_reader_reads_the_columns() {
+    let folder = folder("columns");
+    std::fs::write(folder.join("drop.toml"), SCENE).unwrap();
+    foible_exits(&folder, &["sweep", "drop.toml", "--out", "out", "--jobs", "2"], 0);
+    let script = "import pyarrow.parquet as p, sys; t = p.read_table(sys.argv[1]); print('|'.join(t.column_names)); \
+        print('|'.join(map(str, t.schema.types))); print('|'.join(repr(x) for x in t['peak'].to_pylist()))";
+    let answer = Command::new("python3").args(["-c", script]).arg(folder.join("out/cases.parquet")).output();
+    let answer = answer.unwrap();
+    let said = String::from_utf8_lossy(&answer.stdout).into_owned();
+    assert!(answer.status.success(), "{said} {}", String::from_utf8_lossy(&answer.stderr));
+    let mut lines = said.lines();
+    assert_eq!(lines.next(), Some("case|drop.orientation|height|goes down|peak|failures"), "{said}");
+    assert_eq!(lines.next(), Some("string|string|double|double|double|int32"), "{said}");
+    // As in the CSV file, to its ten digits.
+    let csv = std::fs::read_to_string(folder.join("out/cases.csv")).unwrap();
+    let peaks = lines.next().unwrap().split('|').map(|x| format!("{:.9e}", x.parse::<f64>().unwrap()));
+    assert!(
+        peaks.clone().count() == 18
+            && peaks.zip(csv.lines().skip(1)).all(|(peak, line)| line.contains(&peak))
+    );
+}

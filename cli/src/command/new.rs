@@ -1,7 +1,7 @@
 //! `foible new`.
 
 use super::MET;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 const TEMPLATE: &str = include_str!("new.toml");
 
@@ -56,7 +56,30 @@ impl New {
             None => Path::new("."),
         };
         let folder = folder.canonicalize().map_err(|e| format!("{}: {e}", folder.display()))?;
-        let path = whole.strip_prefix(&folder).unwrap_or(&whole);
-        Ok(path.to_string_lossy().replace('\\', "/"))
+        Ok(way(&folder, &whole).to_string_lossy().replace('\\', "/"))
+    }
+}
+
+/// From a folder to a file, both whole paths: up to the last folder that they share, and down. The whole path where they share
+/// none, as on two drives.
+fn way(folder: &Path, file: &Path) -> PathBuf {
+    let shared = folder.components().zip(file.components()).take_while(|(a, b)| a == b).count();
+    if shared == 0 {
+        return file.to_path_buf();
+    }
+    let up = folder.components().skip(shared).map(|_| Component::ParentDir);
+    up.chain(file.components().skip(shared)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ways_go_up_and_down() {
+        let of = |folder: &str, file: &str| way(Path::new(folder), Path::new(file));
+        assert_eq!(of("/a/b", "/a/b/part.obj"), Path::new("part.obj"));
+        assert_eq!(of("/a/b/scenes", "/a/b/parts/part.obj"), Path::new("../parts/part.obj"));
+        assert_eq!(of("/a/b", "/c/part.obj"), Path::new("../../c/part.obj"));
     }
 }

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct Sweep {
     /// A scene file with a [sweep].
     scene: PathBuf,
-    /// Where results go: a folder per case, cases.csv and index.html; `target/sweeps/NAME` if not given.
+    /// Where results go: a folder per case, cases.csv, cases.parquet and index.html; `target/sweeps/NAME` if not given.
     #[arg(long)]
     out: Option<PathBuf>,
     /// Cases side by side; as many as the machine has threads if not given.
@@ -107,13 +107,16 @@ impl Sweep {
     }
 }
 
-/// `cases.csv` and the page of a sweep.
+/// `cases.csv`, `cases.parquet` and the page of a sweep.
 pub(super) fn write_table(name: &str, table: &Table, done: &[Done], out: &Path) -> Result<(), String> {
     let said = |e: &dyn std::fmt::Display| format!("{}: {e}", out.display());
     std::fs::create_dir_all(out).map_err(|e| said(&e))?;
     let mut csv = Vec::new();
     table.write_csv(&mut csv).map_err(|e| said(&e))?;
     std::fs::write(out.join("cases.csv"), csv).map_err(|e| said(&e))?;
+    let mut columns = Vec::new();
+    table.write_parquet(&mut columns).map_err(|e| said(&e))?;
+    std::fs::write(out.join("cases.parquet"), columns).map_err(|e| said(&e))?;
     let folder = |done: &Done| {
         done.folder.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned())
     };

@@ -226,4 +226,19 @@
   show();
   requestAnimationFrame(tick);
   document.body.dataset.replay = "ready";
+  // What pictures take, told on the console: page.html#measure. First without waiting for the display, then as it goes.
+  if (location.hash === "#measure") {
+    const begun = performance.now();
+    for (let f = 0; f < frames; f++) draw(head.times[f]);
+    const script = (performance.now() - begun) / frames;
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // waits until all is drawn
+    const from = performance.now();
+    let pictures = 0;
+    const count = (now) => {
+      draw((pictures++ * 0.016) % end);
+      if (now - from < 3000) requestAnimationFrame(count);
+      else console.log(`replay: ${script.toFixed(3)} ms of script a picture, ${(pictures / (now - from) * 1000).toFixed(1)} pictures per second`);
+    };
+    requestAnimationFrame(count);
+  }
 })().catch((error) => { document.getElementById("hint").textContent = "The replay cannot be shown: " + error.message; document.body.dataset.replay = "failed"; });

@@ -218,6 +218,16 @@ fn surface(shape: &dyn Shape, reach: f32) -> Option<(Vec<Vector>, Vec<[u32; 3]>)
         TypedShape::Cone(s) => s.to_trimesh(24),
         TypedShape::TriMesh(s) => (s.vertices().to_vec(), s.indices().to_vec()),
         TypedShape::HeightField(s) => s.to_trimesh(),
+        TypedShape::Compound(s) => {
+            let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+            for (pose, part) in s.shapes() {
+                let (own, of_own) = surface(&**part, reach)?;
+                let first = vertices.len() as u32;
+                vertices.extend(own.iter().map(|v| pose.transform_point(*v)));
+                triangles.extend(of_own.iter().map(|t| t.map(|v| v + first)));
+            }
+            (vertices, triangles)
+        }
         TypedShape::HalfSpace(s) => {
             let (a, b) = s.normal.any_orthonormal_pair();
             let corner = |x: f32, y: f32| (a * x + b * y) * reach * HALF_SPACE_REACH;

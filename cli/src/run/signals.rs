@@ -1,7 +1,7 @@
 //! Quantities over time, and what is taken of them.
 
 use super::filter::channel_filter;
-use crate::scene::{Expect, Holds, Quantity, Scene, Take};
+use crate::scene::{Expect, Holds, Quantity, Scene, Take, When};
 use crate::stage::{Stage, size};
 
 /// Gravity \[m/s²\] that a "g" stands for.
@@ -16,6 +16,12 @@ struct Key {
 }
 
 impl Key {
+    /// Of a condition.
+    fn of_condition(when: &When) -> Self {
+        let on = when.on.as_ref().map(|on| on.as_ref().clone());
+        Self { quantity: *when.quantity.as_ref(), of: when.of.as_ref().clone(), on }
+    }
+
     /// Those of a measure: its own, and what is taken off.
     fn of(e: &Expect) -> Vec<Self> {
         let on = e.on.as_ref().map(|on| on.as_ref().clone());
@@ -46,7 +52,9 @@ impl Signals {
     /// Those that a scene asks for, before its first step.
     pub fn new(scene: &Scene, stage: &Stage) -> Self {
         let mut signals: Vec<(Key, Values)> = Vec::new();
-        for key in scene.measure.iter().chain(&scene.expect).flat_map(Key::of) {
+        let measures = || scene.measure.iter().chain(&scene.expect);
+        let conditions = measures().filter_map(|e| e.until.as_ref()).map(|u| Key::of_condition(u.as_ref()));
+        for key in measures().flat_map(Key::of).chain(conditions) {
             if signals.iter().any(|(own, _)| *own == key) {
                 continue;
             }
@@ -113,12 +121,17 @@ impl Signals {
 
     /// Steps of the time that a measure looks at.
     pub fn window(&self, e: &Expect, steps: usize) -> std::ops::Range<usize> {
-        let Some(during) = &e.during else { return 0..steps };
-        let [from, to] = during.as_ref().map(f64::from);
-        // Value k is that at (k + 1) dt; half a step of slack, as times in files are rounded.
-        let first = (from / self.dt - 1.5).ceil().max(0.0) as usize;
-        let end = ((to / self.dt + 0.5).floor().max(0.0) as usize).min(steps);
-        first.min(end)..end
+        let during = e.during.as_ref().map_or(0..steps, |during| {
+            let [from, to] = during.as_ref().map(f64::from);
+            // Value k is that at (k + 1) dt; half a step of slack, as times in files are rounded.
+            let first = (from / self.dt - 1.5).ceil().max(0.0) as usize;
+            let end = ((to / self.dt + 0.5).floor().max(0.0) as usize).min(steps);
+            first.min(end)..end
+        });
+        let Some(until) = e.until.as_ref().map(|until| until.as_ref()) else { return during };
+        let values = self.values(&Key::of_condition(until), None);
+        let end = during.clone().find(|step| until.holds(values[*step]));
+        during.start..end.unwrap_or(during.start)
     }
 
     fn step_at(&self, time: f32, steps: usize) -> usize {
@@ -136,6 +149,9 @@ impl Signals {
             return None;
         };
         let window = self.window(e, series.len());
+        if window.is_empty() {
+            return None;
+        }
         let step = match (&e.at, e.take.unwrap_or_default()) {
             (Some(at), _) => self.step_at(*at.as_ref(), series.len()),
             (None, Take::Last) => window.end.checked_sub(1)?,

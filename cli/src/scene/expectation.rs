@@ -1,6 +1,6 @@
 //! What is watched, and what it must come to.
 
-use super::Vec3;
+use super::{Vec3, When};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
@@ -49,6 +49,10 @@ pub struct Expect {
     /// From when to when \[s\]; from the start to the end if not given.
     #[schemars(with = "Option<[f32; 2]>")]
     pub during: Option<Spanned<[f32; 2]>>,
+    /// Only the steps before the first one, `during` the time, in which this holds; if it never does there is no number, and
+    /// nothing is met.
+    #[schemars(with = "Option<When>")]
+    pub until: Option<Spanned<When>>,
     /// Instead of one value, all or any of those during the time.
     pub holds: Option<Holds>,
     /// A recorded curve that it must stay `within`.
@@ -122,6 +126,9 @@ pub enum Quantity {
     Stress,
     /// Largest principal strain, by size, in a solid deformable.
     Strain,
+    /// Largest distance of a deformable's vertex from where the shape at rest has it, that placed to fit \[m\]: without a load, the
+    /// set that creep has left.
+    Deformation,
 }
 
 /// What is taken of the values over time.
@@ -199,7 +206,10 @@ impl Quantity {
 
     /// Whether only deformables have it.
     pub fn is_soft(self) -> bool {
-        matches!(self, Self::VolumeRatio | Self::Penetration | Self::Stress | Self::Strain)
+        matches!(
+            self,
+            Self::VolumeRatio | Self::Penetration | Self::Stress | Self::Strain | Self::Deformation
+        )
     }
 
     /// Whether probes have it.
@@ -213,7 +223,7 @@ impl Quantity {
     /// Its unit.
     pub fn unit(self) -> &'static str {
         match self {
-            Self::X | Self::Y | Self::Z | Self::Penetration | Self::Drift => "m",
+            Self::X | Self::Y | Self::Z | Self::Penetration | Self::Drift | Self::Deformation => "m",
             Self::Speed | Self::VelocityY | Self::SlipSpeed => "m/s",
             Self::AccelerationG => "g",
             Self::Force | Self::ForceSize => "N",
@@ -254,9 +264,11 @@ impl Expect {
             .during
             .as_ref()
             .map_or(String::new(), |d| format!(" from {} to {} s", d.as_ref()[0], d.as_ref()[1]));
+        let until =
+            self.until.as_ref().map_or(String::new(), |until| format!(" until {}", until.as_ref().text()));
         let cfc = self.cfc.as_ref().map_or(String::new(), |cfc| format!(", CFC {}", cfc.as_ref()));
         format!(
-            "{take}{} of {}{}{}{at}{during}{cfc}",
+            "{take}{} of {}{}{}{at}{during}{until}{cfc}",
             self.quantity.as_ref().name(),
             self.of.as_ref(),
             part("on", &self.on),

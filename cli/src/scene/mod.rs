@@ -20,7 +20,7 @@ pub use deformable::{
 pub use drop::{Axis, Drop, Entry, Mode, Orientations, Random, Range, Scale, Sweep};
 pub use expectation::{Curve, Expect, Holds, Probe, Quantity, Take};
 pub use mistake::SceneError;
-pub use rigid::{Joint, JointKind, Kind, Motor, Rigid, Shape, Switch};
+pub use rigid::{Joint, JointKind, Kind, Motor, Part, Rigid, Shape, Switch};
 pub use schema::schema;
 pub use trigger::{MotorSwitch, Trigger, When};
 

@@ -121,6 +121,11 @@ pub enum Shape {
         #[serde(default)]
         z_up: bool,
     },
+    /// Several of the simple shapes at once.
+    Compound {
+        /// Of one body.
+        parts: Vec<Part>,
+    },
     /// Heights on a grid over x and z, rows along x.
     Heightfield {
         /// Rows along x, one after another along z \[m\].
@@ -128,6 +133,20 @@ pub enum Shape {
         /// Along x and z \[m\].
         size: [f32; 2],
     },
+}
+
+/// A part of a compound shape.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Part {
+    /// A ball, box, capsule, cylinder or cone.
+    pub shape: Shape,
+    /// Where it is in the body \[m\].
+    #[serde(default)]
+    pub translation: Vec3,
+    /// Axis times angle \[degrees\].
+    #[serde(default)]
+    pub rotation: Vec3,
 }
 
 pub(super) fn one() -> f32 {

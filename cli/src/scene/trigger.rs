@@ -47,6 +47,24 @@ pub struct When {
     pub at_least: Option<f64>,
 }
 
+impl When {
+    /// As a sentence says it: "force of cube on floor is at least 10".
+    pub fn text(&self) -> String {
+        let on = self.on.as_ref().map_or(String::new(), |on| format!(" on {}", on.as_ref()));
+        let bound = |word: &str, limit: Option<f64>| limit.map(|limit| format!("at {word} {limit}"));
+        let bounds: Vec<String> =
+            [bound("least", self.at_least), bound("most", self.at_most)].into_iter().flatten().collect();
+        format!("{} of {}{on} is {}", self.quantity.as_ref().name(), self.of.as_ref(), bounds.join(" and "))
+    }
+
+    /// Whether a value is within the bounds; NaN is not.
+    pub fn holds(&self, value: f64) -> bool {
+        !value.is_nan()
+            && self.at_most.is_none_or(|most| value <= most)
+            && self.at_least.is_none_or(|least| value >= least)
+    }
+}
+
 /// The motor of the joint between two rigid bodies.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -273,7 +273,8 @@ pub struct Place {
     pub after: String,
 }
 
-/// The place of a dotted path, `deformable.foam.material.density`; entries of lists go by their `name` or number.
+/// The place of a dotted path, `deformable.foam.material.density`; entries of lists go by their `name` or number, those
+/// of vectors by their axis too: `rigid.box.translation.y`.
 pub fn place_of(table: &DeTable<'_>, text: &str, path: &str) -> Result<Place, String> {
     let mut keys: Vec<&str> = path.split('.').collect();
     let last = keys.pop().unwrap_or_default();
@@ -286,15 +287,24 @@ pub fn place_of(table: &DeTable<'_>, text: &str, path: &str) -> Result<Place, St
         so_far.push(key);
         let names = || table.keys().map(|k| k.get_ref().to_string()).collect::<Vec<_>>();
         let value = table.get(key).ok_or_else(|| super::mistake::none_such(&so_far.join("."), &names()))?;
-        let value = match value.get_ref() {
-            DeValue::Array(entries) => {
-                let which = keys.next().unwrap_or(last);
-                so_far.push(which);
-                entry(entries, which)
-                    .ok_or_else(|| super::mistake::none_such(&so_far.join("."), &entry_names(entries)))?
-            }
-            _ => value,
-        };
+        let mut value = value;
+        let mut is_named = false;
+        while let DeValue::Array(entries) = value.get_ref()
+            && !is_named
+        {
+            let which = keys.next();
+            is_named = which.is_none();
+            so_far.push(which.unwrap_or(last));
+            value = entry(entries, which.unwrap_or(last))
+                .ok_or_else(|| super::mistake::none_such(&so_far.join("."), &entry_names(entries)))?;
+        }
+        if is_named {
+            let is_value = !value.get_ref().is_table() && !value.get_ref().is_array();
+            let place = Place { at: value.span(), before: String::new(), after: String::new() };
+            return is_value
+                .then_some(place)
+                .ok_or_else(|| "is no number or text; name what is in it".into());
+        }
         own = Some(value.span());
         table = value.get_ref().as_table().ok_or_else(|| format!("`{}` is no table", so_far.join(".")))?;
     }
@@ -322,7 +332,10 @@ fn name_of<'a>(entry: &'a Spanned<DeValue<'_>>) -> Option<&'a str> {
 
 fn entry<'a, 'i>(entries: &'a [Spanned<DeValue<'i>>], which: &str) -> Option<&'a Spanned<DeValue<'i>>> {
     let named = entries.iter().find(|entry| name_of(entry) == Some(which));
-    named.or_else(|| entries.get(which.parse::<usize>().ok()?))
+    // Of a vector, by its axis too.
+    let is_vector = entries.len() == 3 && entries.iter().all(|entry| !entry.get_ref().is_table());
+    let axis = || ["x", "y", "z"].iter().position(|axis| is_vector && *axis == which);
+    named.or_else(|| entries.get(which.parse::<usize>().ok().or_else(axis)?))
 }
 
 fn entry_names(entries: &[Spanned<DeValue<'_>>]) -> Vec<String> {

@@ -87,6 +87,7 @@ impl Stage {
                 self.world.contacts_of(handle).map(|c| -c.gap).chain(own).fold(0.0, f64::max)
             }
             Quantity::Stress | Quantity::Strain => largest_of_elements(quantity, body).0,
+            Quantity::Deformation => deformation(body),
             _ => f64::NAN,
         }
     }
@@ -202,6 +203,18 @@ impl Stage {
 
 pub(crate) fn size([x, y, z]: [f64; 3]) -> f64 {
     x.hypot(y).hypot(z)
+}
+
+/// The largest distance of a vertex from the shape at rest, that placed to fit.
+fn deformation(body: &DeformableBody) -> f64 {
+    let (pose, rest) = (body.pose(), body.model());
+    let distance = |vertex: usize| {
+        let at = body.position(vertex).unwrap_or([f64::NAN; 3]);
+        let should = pose.transform_point(Vector::from(rest.rest_position(vertex).map(|c| c as f32)));
+        let off = at.iter().zip(should.to_array()).map(|(x, s)| x - f64::from(s));
+        off.map(|d| d * d).sum::<f64>().sqrt()
+    };
+    (0..body.vertex_count()).map(distance).fold(0.0, |a, d| if d.is_nan() { d } else { a.max(d) })
 }
 
 /// The largest von Mises stress or principal strain, and the middle of its tetrahedron; zero and NaN where there is none.

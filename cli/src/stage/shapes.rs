@@ -1,12 +1,13 @@
 //! Shapes of colliders.
 
-use crate::scene::Shape;
+use super::pose;
+use crate::scene::{Part, Shape};
 use foible3d::prelude::*;
 use rapier3d::parry::utils::Array2;
 use rapier3d::prelude::*;
 use std::path::Path;
 
-/// A shape that is no mesh and no heightfield. Lengths and normals were checked with the file.
+/// A shape that is no mesh, no heightfield and no compound. Lengths and normals were checked with the file.
 pub(super) fn simple_shape(shape: &Shape) -> Option<SharedShape> {
     Some(match *shape {
         Shape::Ball { radius } => SharedShape::ball(radius),
@@ -15,7 +16,7 @@ pub(super) fn simple_shape(shape: &Shape) -> Option<SharedShape> {
         Shape::Cylinder { half_height, radius } => SharedShape::cylinder(half_height, radius),
         Shape::Cone { half_height, radius } => SharedShape::cone(half_height, radius),
         Shape::HalfSpace { normal } => SharedShape::halfspace(Vector::from(normal).normalize()),
-        Shape::Mesh { .. } | Shape::Heightfield { .. } => return None,
+        Shape::Mesh { .. } | Shape::Heightfield { .. } | Shape::Compound { .. } => return None,
     })
 }
 
@@ -31,6 +32,12 @@ pub(super) fn shape(shape: &Shape, folder: &Path) -> Result<SharedShape, String>
             // Parry's rows go along z, its data column by column.
             let data = (0..columns).flat_map(|c| heights.iter().map(move |row| row[c])).collect();
             Ok(SharedShape::heightfield(Array2::new(rows, columns, data), Vector::new(*x, 1.0, *z)))
+        }
+        Shape::Compound { parts } => {
+            let part =
+                |part: &Part| Some((pose(part.translation, part.rotation), simple_shape(&part.shape)?));
+            let parts: Option<Vec<_>> = parts.iter().map(part).collect();
+            parts.map(SharedShape::compound).ok_or_else(|| "a part of it is not simple".into())
         }
         simple => simple_shape(simple).ok_or_else(|| "no such shape".into()),
     }

@@ -12,10 +12,7 @@ impl Stage {
                 trigger.after.as_ref().is_none_or(|after| time >= f64::from(*after.as_ref()) - 1e-6);
             let is_so = |when: &When| {
                 let on = when.on.as_ref().map(|on| on.as_ref().as_str());
-                let value = self.measure(*when.quantity.as_ref(), when.of.as_ref(), on);
-                // NaN is no condition that holds.
-                when.at_most.is_none_or(|most| value <= most)
-                    && when.at_least.is_none_or(|least| value >= least)
+                when.holds(self.measure(*when.quantity.as_ref(), when.of.as_ref(), on))
             };
             if !self.happened[k] && is_time && trigger.when.as_ref().is_none_or(|when| is_so(when.as_ref())) {
                 self.happened[k] = true;

@@ -1,6 +1,7 @@
 //! Many cases of a scene: what they are, running them side by side, and the table of what they come to.
 
 mod cases;
+mod columns;
 mod jobs;
 mod table;
 

@@ -52,6 +52,12 @@ pub(super) fn check_measure(scene: &Scene, e: &Expect) -> Result<(), Mistake> {
     if e.take == Some(Take::SettleTime) && e.within.is_none() {
         return Err((e.quantity.span(), "`settle_time` needs `within`, how near to the last value".into()));
     }
+    if let Some(until) = &e.until {
+        if e.at.is_some() {
+            return Err((until.span(), "`until` ends the time that is looked at: give no `at`".into()));
+        }
+        check_condition(scene, until.as_ref(), until.span(), "until")?;
+    }
     if e.holds.is_some() && (e.take.is_some() || e.at.is_some()) {
         return Err((e.quantity.span(), "`holds` looks at every step: give no `take` and no `at`".into()));
     }
@@ -76,7 +82,7 @@ fn check_filter(scene: &Scene, e: &Expect) -> Result<(), Mistake> {
 
 /// The condition of a trigger.
 pub(super) fn check_when(scene: &Scene, when: &When, at: Range<usize>) -> Result<(), Mistake> {
-    check_quantity_of(scene, *when.quantity.as_ref(), when.quantity.span(), &[&when.of], when.on.as_ref())?;
+    check_condition(scene, when, at.clone(), "when")?;
     if *when.quantity.as_ref() == Quantity::AccelerationG || when.quantity.as_ref().is_of_steps() {
         let name = when.quantity.as_ref().name();
         return Err((
@@ -84,8 +90,13 @@ pub(super) fn check_when(scene: &Scene, when: &When, at: Range<usize>) -> Result
             format!("`when`: `{name}` is known after the run only; take a `speed` or a `force`"),
         ));
     }
+    Ok(())
+}
+
+fn check_condition(scene: &Scene, when: &When, at: Range<usize>, key: &str) -> Result<(), Mistake> {
+    check_quantity_of(scene, *when.quantity.as_ref(), when.quantity.span(), &[&when.of], when.on.as_ref())?;
     if when.at_most.is_none() && when.at_least.is_none() {
-        return Err((at, "`when` needs `at_most` or `at_least`".into()));
+        return Err((at, format!("`{key}` needs `at_most` or `at_least`")));
     }
     Ok(())
 }

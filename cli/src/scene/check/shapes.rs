@@ -1,7 +1,7 @@
 //! Shapes: whether they have a size, and one that ends.
 
 use super::LARGEST;
-use crate::scene::{Body, Shape};
+use crate::scene::{Body, Part, Shape};
 
 /// Cells of a lattice, cells that a filled shape is cut into, segments of a rope, at the most. A cube of 98 415 tetrahedra is the largest
 /// that has been measured.
@@ -19,6 +19,7 @@ pub(super) fn shape_problem(shape: &Shape) -> Option<String> {
             return zero.then(|| "`normal` must not be zero".into());
         }
         Shape::Mesh { scale, .. } => vec![("scale", *scale)],
+        Shape::Compound { parts } => return compound_problem(parts),
         Shape::Heightfield { heights, size } => {
             if let Some(problem) = heightfield_problem(heights) {
                 return Some(problem);
@@ -28,6 +29,22 @@ pub(super) fn shape_problem(shape: &Shape) -> Option<String> {
     };
     let wrong = lengths.into_iter().find(|(_, length)| !(*length > 0.0 && *length <= LARGEST));
     wrong.map(|(key, length)| format!("`{key}` is {length}, but must be positive, up to {LARGEST:e}"))
+}
+
+fn compound_problem(parts: &[Part]) -> Option<String> {
+    if parts.is_empty() {
+        return Some("`parts` is empty, but a compound has at least one".into());
+    }
+    parts.iter().find_map(|part| match &part.shape {
+        Shape::HalfSpace { .. } | Shape::Mesh { .. } | Shape::Heightfield { .. } | Shape::Compound { .. } => {
+            Some("`parts` of a compound are balls, boxes, capsules, cylinders and cones".into())
+        }
+        simple => {
+            let placed = part.translation.iter().chain(&part.rotation).find(|x| !(x.abs() <= LARGEST));
+            let placed = placed.map(|x| format!("a part is placed at {x}, but must be up to {LARGEST:e}"));
+            shape_problem(simple).or(placed)
+        }
+    })
 }
 
 fn heightfield_problem(heights: &[Vec<f32>]) -> Option<String> {
@@ -53,7 +70,7 @@ pub(super) fn body_problem(body: &Body) -> Option<String> {
             cells_problem(cells).or_else(|| shape_problem(&Shape::Cuboid { half_extents: *half_extents }))
         }
         Body::Filled { shape, cell_size } => {
-            if matches!(shape, Shape::Mesh { .. } | Shape::Heightfield { .. }) {
+            if matches!(shape, Shape::Mesh { .. } | Shape::Heightfield { .. } | Shape::Compound { .. }) {
                 return Some("`filled` fills simple shapes; give `mesh` as the body itself".into());
             }
             shape_problem(shape).or_else(|| filled_problem(shape, *cell_size))
