@@ -28,6 +28,22 @@ pub enum BodyError {
         /// Number of regions of the body.
         regions: usize,
     },
+    /// The body has no such closed room.
+    #[error("cavity {cavity} does not exist: the body has {cavities}")]
+    NoSuchCavity {
+        /// The cavity asked for.
+        cavity: usize,
+        /// Number of cavities of the body.
+        cavities: usize,
+    },
+    /// What no cavity can be filled with.
+    #[error("the filling of cavity {cavity} cannot be: {what}")]
+    BadFilling {
+        /// The cavity that was to be filled.
+        cavity: usize,
+        /// What is wrong.
+        what: &'static str,
+    },
     /// A state of another mesh, or lists of vertices to attach that do not go together.
     #[error("{vertices} vertices are given where {expected} are expected")]
     WrongSize {

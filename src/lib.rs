@@ -99,11 +99,11 @@ pub use coupling::{
     DeformableColliders, DeformableContactModificationContext, DeformableHooks, DeformablePairFilterContext,
     DeformableSolverContact, PhysicsParts,
 };
-pub use energy::Elasticity;
+pub use energy::{CavityFilling, Elasticity};
 pub use error::{BodyError, DeformableBodyError, HandleError};
 #[cfg(feature = "export")]
 pub use export::VtkSeries;
-pub use fem::{DeformableModel, SystemMatrix};
+pub use fem::{DeformableCavity, DeformableModel, SystemMatrix};
 pub use material::{DeformableMaterial, MaterialError, MaxwellBranch};
 pub use mesh::{
     MeshError, Structure, SurfaceFault, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, TetMesh,
@@ -121,8 +121,8 @@ pub use solver::DeformableMode;
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
 pub mod prelude {
     pub use crate::{
-        Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
-        DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
+        Acceleration, AttachTo, CavityFilling, DeformableAttachment, DeformableAttachmentHandle,
+        DeformableBody, DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
         DeformableChannelEventCollector, DeformableColliders, DeformableCollisionEvent, DeformableContact,
         DeformableContactForceEvent, DeformableContactModificationContext, DeformableContactPartner,
         DeformableCounters, DeformableDrag, DeformableEventHandler, DeformableHooks, DeformableMaterial,

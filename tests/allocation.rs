@@ -118,3 +118,14 @@ fn a_tumbling_beam_allocates_nothing() {
         beam().translation(Vector::Y * 500.0).linvel(Vector::Y * 5.0).angvel(Vector::new(20.0, 30.0, 1.0));
     assert_eq!(allocations(vec![beam], &[], 120, 60), 0);
 }
+
+#[test]
+fn a_sealed_hollow_cube_on_the_floor_allocates_nothing() {
+    let hollow =
+        TetMesh::cuboid([0.2; 3], [4; 3]).unwrap().without(|x| x.iter().all(|c| c.abs() < 0.1)).unwrap();
+    let gas = foible3d::CavityFilling::Gas { gauge: 1e3, ambient: 101_325.0, volume: 0.008, exponent: 1.4 };
+    let body = DeformableBodyBuilder::mesh(&hollow).fill_cavity(0, gas).can_sleep(false);
+    let body =
+        body.material(DeformableMaterial::new(1e6, 0.3).mass_damping(2.0)).translation(Vector::Y * 0.2);
+    assert_eq!(allocations(vec![body], &[], 180, 40), 0);
+}

@@ -24,7 +24,7 @@ promises! {
     is_thread_safe: DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody,
         DeformableBodyBuilder, DeformableModel, DeformableState, DeformableMaterial, DeformableParameters,
         DeformableCounters, TetMesh, Structure, SolverSettings, Solver, SystemMatrix, Frames, Integrator,
-        Acceleration, FactorPrecision, Fidelity, Elasticity, DeformableBodyHandle, DeformableAttachment,
+        Acceleration, FactorPrecision, Fidelity, Elasticity, CavityFilling, foible3d::DeformableCavity, DeformableBodyHandle, DeformableAttachment,
         DeformableAttachmentHandle, AttachTo, DeformableContact, DeformablePairContact, RigidContact, JointForce,
         JointRole, SolvedJoint, DeformableSurfacePoint, DeformableBodyError, BodyError, HandleError, MaterialError,
         MeshError, DeformableContactPartner, DeformableWind, DeformableRest, DeformableMode, MaxwellBranch, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceFault, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableDrag, DeformableCollisionEvent,
@@ -41,7 +41,7 @@ const fn is_copied<T: Copy + PartialEq + Debug>() {}
 
 promises! {
     is_copied: DeformableMaterial, DeformableParameters, DeformableCounters, SolverSettings, Solver, SystemMatrix,
-        Frames, Integrator, Acceleration, FactorPrecision, Fidelity, Elasticity, DeformableBodyHandle,
+        Frames, Integrator, Acceleration, FactorPrecision, Fidelity, Elasticity, CavityFilling, foible3d::DeformableCavity, DeformableBodyHandle,
         DeformableAttachmentHandle, DeformableContact, DeformablePairContact, RigidContact, JointForce, JointRole,
         SolvedJoint, DeformableSurfacePoint, BodyError, HandleError, MaterialError, DeformableContactPartner, DeformableWind, DeformableRest,
         DeformableCollisionEvent, DeformableContactForceEvent, DeformableSolverContact;

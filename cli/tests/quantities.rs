@@ -408,3 +408,46 @@ fn a_carton_stops_its_product_as_a_spring_does_on_every_face() {
     println!("peaks {least} to {largest} g");
     assert!(largest < 1.003 * least, "{peaks:?}");
 }
+
+/// A hollow block with gas in it, pressed by a plate: what it keeps, and what it could not be filled with.
+#[test]
+fn a_sealed_block_keeps_its_gas() {
+    let text = |hollows: &str, cavities: &str| {
+        format!(
+            r#"
+            world = {{ duration = 1.0, dt = 0.01 }}
+            rigid = [
+                {{ name = "floor", kind = "fixed", shape = {{ cuboid = {{ half_extents = [1, 0.1, 1] }} }}, translation = [0, -0.1, 0] }},
+                {{ name = "plate", kind = "kinematic", shape = {{ cuboid = {{ half_extents = [0.2, 0.05, 0.2] }} }}, translation = [0, 0.25, 0] }},
+            ]
+            deformable = [{{ name = "block", body = {{ lattice = {{ half_extents = ["10 cm", "10 cm", "10 cm"], cells = [4, 4, 4], {hollows} }} }},
+                translation = [0, 0.1, 0], cavities = [{cavities}],
+                material = {{ youngs_modulus = 1e5, poisson_ratio = 0.3, mass_damping = 5 }} }}]
+            move = [{{ of = "plate", during = [0.1, 0.5], by = [0, -0.02, 0] }}]
+            measure = [
+                {{ name = "pressure", quantity = "cavity_pressure", of = "block" }},
+                {{ name = "volume", quantity = "cavity_volume", of = "block" }},
+            ]
+            "#
+        )
+    };
+    let hollow = "hollows = [{ min = [-0.05, -0.05, -0.05], max = [0.05, 0.05, 0.05] }]";
+    let sealed = outcome(&text(hollow, "{ gas = { gauge = \"2 kPa\", exponent = 1.0 } }"));
+    let (pressure, volume) = (number(&sealed, "pressure"), number(&sealed, "volume"));
+    assert!(pressure > 3e3 && volume < 0.98e-3, "{pressure} {volume}");
+    // Lengths of scene files are single numbers: 6e-8 each.
+    assert!(((pressure + 101_325.0) * volume / (103_325.0 * 1e-3) - 1.0).abs() < 1e-6, "{pressure} {volume}");
+    for (hollows, cavities, says) in [
+        ("", "{ pressure = { gauge = 1.0 } }", "fills 1 closed rooms, but there are 0"),
+        (hollow, "{ gas = { gauge = -2e5 } }", "its pressure is below nothing"),
+        (hollow, "{ gas = { gage = 1.0 } }", "gauge"),
+    ] {
+        let said = match foible_cli::scene::parse(&text(hollows, cavities)) {
+            Err(error) => error.to_string(),
+            Ok(_) => {
+                run(&common::scene(&text(hollows, cavities)), &RunOptions::default()).outcome.error.unwrap()
+            }
+        };
+        assert!(said.contains(says), "{said}");
+    }
+}

@@ -7,6 +7,7 @@ use super::settings::SolverSettings;
 use super::sleep::{STILL_SPEED, TIME_UNTIL_SLEEP};
 use super::state::{DeformableState, History, Sleep};
 use super::wind::DeformableWind;
+use crate::energy::CavityFilling;
 use crate::error::BodyError;
 use crate::fem::{DeformableModel, Elements, volume};
 use crate::material::DeformableMaterial;
@@ -83,6 +84,8 @@ pub struct DeformableBody {
     pub(crate) report: StepReport,
     pub(super) settings: SolverSettings,
     pub(crate) activation: f64,
+    /// Of the model's cavities; empty while nothing was filled.
+    pub(crate) fillings: Vec<Option<CavityFilling>>,
     pub(super) gravity_scale: f64,
     pub(super) enabled: bool,
     pub(super) can_sleep: bool,
@@ -131,6 +134,7 @@ impl DeformableBody {
             report: StepReport::default(),
             settings: SolverSettings::default(),
             activation: 1.0,
+            fillings: Vec::new(),
             gravity_scale: 1.0,
             enabled: true,
             can_sleep: true,

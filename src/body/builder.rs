@@ -2,6 +2,7 @@
 
 use super::body::DeformableBody;
 use super::settings::{Fidelity, SolverSettings};
+use crate::energy::CavityFilling;
 use crate::error::DeformableBodyError;
 use crate::fem::{Build, DeformableModel};
 use crate::material::DeformableMaterial;
@@ -34,6 +35,7 @@ pub struct DeformableBodyBuilder {
     model: Result<Arc<DeformableModel>, MeshError>,
     material: DeformableMaterial,
     region_materials: Vec<(u32, DeformableMaterial)>,
+    fillings: Vec<(usize, CavityFilling)>,
     settings: SolverSettings,
     pose: Pose,
     body_type: RigidBodyType,
@@ -144,6 +146,7 @@ impl DeformableBodyBuilder {
             model,
             material: DeformableMaterial::new(1.0e6, 0.3),
             region_materials: Vec::new(),
+            fillings: Vec::new(),
             settings: build.defaults(),
             pose: Pose::IDENTITY,
             body_type: RigidBodyType::Dynamic,
@@ -265,6 +268,13 @@ impl DeformableBodyBuilder {
         self
     }
 
+    /// Fills a cavity, by its place among [`DeformableModel::cavities`]: [`DeformableBody::fill_cavity`]. One that is not there is
+    /// an error of [`DeformableBodyBuilder::build`].
+    pub fn fill_cavity(mut self, cavity: usize, filling: CavityFilling) -> Self {
+        self.fillings.push((cavity, filling));
+        self
+    }
+
     /// Sets the factor on gravity; a non-finite one is taken as zero.
     pub fn gravity_scale(mut self, scale: f64) -> Self {
         self.gravity_scale = scale;
@@ -341,6 +351,9 @@ impl DeformableBodyBuilder {
         let mut body = DeformableBody::new(self.model.clone()?, self.material);
         for (region, material) in &self.region_materials {
             body.set_region_material(*region, *material)?;
+        }
+        for (cavity, filling) in &self.fillings {
+            body.fill_cavity(*cavity, Some(*filling))?;
         }
         body.teleport(self.pose)?;
         body.set_body_type(self.body_type);

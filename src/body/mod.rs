@@ -19,6 +19,7 @@ mod kinematics;
 #[allow(clippy::module_inception)]
 mod body;
 
+mod cavities;
 mod controls;
 mod forces;
 mod motion;

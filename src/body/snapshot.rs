@@ -10,6 +10,7 @@ use super::slots::{Slot, Slots};
 use super::state::DeformableState;
 use super::touching::{Touch, TouchKey};
 use super::wind::DeformableWind;
+use crate::energy::CavityFilling;
 use crate::fem::DeformableModel;
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
@@ -66,6 +67,7 @@ struct BodyRecord {
     report: StepReport,
     settings: SolverSettings,
     activation: f64,
+    fillings: Vec<Option<CavityFilling>>,
     gravity_scale: f64,
     enabled: bool,
     can_sleep: bool,
@@ -251,6 +253,11 @@ impl DeformableBody {
             wind.velocity.is_finite()
                 && [wind.density, wind.drag, wind.friction].iter().all(|c| c.is_finite())
         });
+        let cavities = self.model.cavities.len();
+        let fits = self.fillings.is_empty() || self.fillings.len() == cavities;
+        if !fits || self.fillings.iter().flatten().any(|filling| filling.fault().is_some()) {
+            return Err("what fills its cavities does not fit them".to_string());
+        }
         let scales = (0.0..=10.0).contains(&self.activation) && self.gravity_scale.is_finite();
         if !(drives && blows && scales && !self.time_until_sleep.is_nan()) {
             return Err("a number of it is out of range".to_string());

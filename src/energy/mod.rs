@@ -4,11 +4,13 @@
 //! To add one for tetrahedra: a file with a type that implements [`ElementEnergy`], and its line in the list of
 //! `energies!` below, with what is to be said of it. The tests cover all of the list.
 
+mod filling;
 pub(crate) mod membrane;
 mod principal;
 pub(crate) mod stencil;
 pub(crate) mod strain_limit;
 
+pub use filling::CavityFilling;
 pub(crate) use principal::{Mode, Principal, modes};
 pub(crate) use strain_limit::Limited;
 

@@ -2,6 +2,7 @@
 //!
 //! Architecture invariant: nothing here knows a body's state beyond the positions it is given.
 
+mod cavities;
 mod elements;
 mod patches;
 mod regions;
@@ -26,6 +27,7 @@ mod frames;
 pub(crate) mod constant_matrix;
 mod tangents;
 
+pub use cavities::DeformableCavity;
 pub use constant_matrix::SystemMatrix;
 pub(crate) use frames::{floating_frame, node_rotations, volume};
 pub use model::DeformableModel;

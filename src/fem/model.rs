@@ -1,5 +1,6 @@
 //! The constant part of a body: rest mesh, elements, surface, node order.
 
+use super::cavities::{Cavity, DeformableCavity, cavities};
 use super::elements::{ElementBlock, Stencil, TriangleElement};
 use super::regions::{Region, VolumeShares, blocks, set_ranges};
 use super::smoothing::SmoothingDomains;
@@ -43,6 +44,8 @@ pub struct DeformableModel {
     pub(crate) coupling: Vec<Vec<u32>>,
     /// The boundary.
     pub(crate) surface: Surface,
+    /// Closed rooms, the largest first.
+    pub(crate) cavities: Vec<Cavity>,
     /// Extent of the rest shape: diagonal of its bounding box \[m\].
     pub(crate) size: f64,
     /// Volume at rest \[m³\].
@@ -167,6 +170,7 @@ impl DeformableModel {
         let thin_nodes = thin.triangles.iter().map(|t| &t.nodes[..]);
         let thin_nodes = thin_nodes.chain(thin.stencils.iter().map(|s| &s.nodes[..]));
         let adjacency = node_adjacency(tetrahedra.iter().map(|t| &t[..]).chain(thin_nodes), rest.len());
+        let cavities = cavities(&surface, &rest);
         Self {
             id: next_id(),
             blocks,
@@ -184,6 +188,7 @@ impl DeformableModel {
             half_thickness: thin.half_thickness,
             tetrahedra,
             node_volumes,
+            cavities,
             surface,
             node_of_vertex,
             vertex_of_node,
@@ -257,6 +262,11 @@ impl DeformableModel {
     /// Vertices of the tetrahedra.
     pub fn tetrahedra(&self) -> impl ExactSizeIterator<Item = [u32; 4]> + '_ {
         self.tetrahedra.iter().map(|t| t.map(|n| self.vertex_of_node[n as usize]))
+    }
+
+    /// Closed rooms, the largest first: hollows within the tetrahedra, and what sheets close in that are wound one way.
+    pub fn cavities(&self) -> impl ExactSizeIterator<Item = DeformableCavity> + '_ {
+        self.cavities.iter().map(|cavity| cavity.describe(&self.rest))
     }
 
     /// Nodes along each rod.

@@ -78,6 +78,41 @@ impl TetMesh {
         self
     }
 
+    /// The same without the tetrahedra whose middle \[m\] is in a room, and without the vertices that no other has: chambers for
+    /// [`DeformableBody::fill_cavity`](crate::DeformableBody::fill_cavity), holes, notches.
+    ///
+    /// ```
+    /// use foible3d::{DeformableModel, TetMesh};
+    /// let finger = TetMesh::cuboid([0.1, 0.03, 0.03], [20, 6, 6])?;
+    /// let finger = finger.without(|[x, y, z]| x.abs() < 0.09 && y > 0.0 && y < 0.02 && z.abs() < 0.02)?;
+    /// let chamber = DeformableModel::new(&finger).cavities().next().expect("it is closed");
+    /// assert!((chamber.volume - 0.18 * 0.02 * 0.04).abs() < 1.0e-12);
+    /// # Ok::<(), foible3d::MeshError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`TetMesh::new`]: [`MeshError::Empty`] if nothing is left, and surfaces that touch themselves along an edge.
+    pub fn without(&self, is_room: impl Fn([f64; 3]) -> bool) -> Result<Self, MeshError> {
+        let mut number = vec![u32::MAX; self.vertices.len()];
+        let (mut vertices, mut tetrahedra, mut regions) = (Vec::new(), Vec::new(), Vec::new());
+        for (tet, region) in self.tetrahedra.iter().zip(&self.regions) {
+            if is_room(middle(&self.vertices, tet)) {
+                continue;
+            }
+            let mut name = |old: u32| {
+                let new = &mut number[old as usize];
+                if *new == u32::MAX {
+                    *new = vertices.len() as u32;
+                    vertices.push(self.vertices[old as usize]);
+                }
+                *new
+            };
+            tetrahedra.push(tet.map(&mut name));
+            regions.push(*region);
+        }
+        Ok(Self { regions, names: self.names.clone(), ..Self::new(vertices, tetrahedra)? })
+    }
+
     /// The same with all lengths times `factor`: 0.001 for millimetres.
     ///
     /// # Errors

@@ -248,9 +248,7 @@ impl Island {
 
     /// One iteration.
     fn iterate(&mut self, context: &SolveContext<'_>) -> Outcome {
-        if self.newton_factors.refresh(&mut self.bodies, context.factors, self.contacts.constraints()) {
-            self.contacts.outdate(Change::Factors);
-        }
+        self.refresh(context);
         let mut outcome;
         loop {
             outcome = Outcome::Descended;
@@ -303,6 +301,19 @@ impl Island {
             body.accept_trial();
         });
         outcome
+    }
+
+    /// Brings factors of bodies that make their own, and what their cavities resist, to where the iteration is.
+    fn refresh(&mut self, context: &SolveContext<'_>) {
+        let constraints = self.contacts.constraints();
+        let mut changed = self.newton_factors.refresh(&mut self.bodies, context.factors, constraints);
+        let own = Factors { cache: context.factors, newton: &self.newton_factors };
+        for (index, body) in self.bodies.iter_mut().enumerate() {
+            changed |= body.refresh_cavities(own.of(index, body));
+        }
+        if changed {
+            self.contacts.outdate(Change::Factors);
+        }
     }
 
     /// Evaluates the trial positions; true if one of them was bent to a true rotation.

@@ -1,6 +1,7 @@
 //! Deformable bodies: what they are made of, and how they are solved.
 
 use super::{Shape, Vec3};
+use foible3d::CavityFilling;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
@@ -39,9 +40,70 @@ pub struct Deformable {
     #[serde(default)]
     #[schemars(with = "Vec<RegionMaterial>")]
     pub regions: Vec<Spanned<RegionMaterial>>,
+    /// What fills its closed rooms, the largest first.
+    #[serde(default)]
+    #[schemars(with = "Vec<Filling>")]
+    pub cavities: Vec<Spanned<Filling>>,
     /// How it is solved.
     #[serde(default)]
     pub solver: Solver,
+}
+
+/// What fills a closed room. Pressures are above that around the body, in Pa.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Filling {
+    /// The same pressure at any volume.
+    Pressure {
+        /// \[Pa\]
+        gauge: f64,
+    },
+    /// A sealed amount of gas, at the volume at rest of this pressure.
+    Gas {
+        /// \[Pa\]
+        #[serde(default)]
+        gauge: f64,
+        /// Pressure around the body (101325) \[Pa\].
+        #[serde(default = "ambient")]
+        ambient: f64,
+        /// 1 for slow changes, 1.4 for quick ones of air (1.4).
+        #[serde(default = "exponent")]
+        exponent: f64,
+    },
+    /// A liquid, `excess` over the volume at rest.
+    Liquid {
+        /// Over the volume at rest, as a part of it.
+        #[serde(default)]
+        excess: f64,
+        /// (2.2e9) \[Pa\]
+        #[serde(default = "of_water")]
+        bulk_modulus: f64,
+    },
+}
+
+impl Filling {
+    /// Of a cavity of this volume at rest \[m³\].
+    pub fn at_rest(self, volume: f64) -> CavityFilling {
+        match self {
+            Self::Pressure { gauge } => CavityFilling::Pressure { gauge },
+            Self::Gas { gauge, ambient, exponent } => CavityFilling::Gas { gauge, ambient, volume, exponent },
+            Self::Liquid { excess, bulk_modulus } => {
+                CavityFilling::Liquid { volume: volume * (1.0 + excess), bulk_modulus }
+            }
+        }
+    }
+}
+
+fn ambient() -> f64 {
+    101_325.0
+}
+
+fn exponent() -> f64 {
+    1.4
+}
+
+fn of_water() -> f64 {
+    2.2e9
 }
 
 /// The shape of a soft body.
@@ -54,6 +116,9 @@ pub enum Body {
         half_extents: Vec3,
         /// Along x, y and z.
         cells: [usize; 3],
+        /// Boxes of its own frame that are left out, whole cells: chambers for `cavities`, holes.
+        #[serde(default)]
+        hollows: Vec<Region>,
     },
     /// A simple shape, filled with tetrahedra.
     Filled {

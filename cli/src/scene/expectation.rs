@@ -129,6 +129,10 @@ pub enum Quantity {
     /// Largest distance of a deformable's vertex from where the shape at rest has it, that placed to fit \[m\]: without a load, the
     /// set that creep has left.
     Deformation,
+    /// Largest pressure in a cavity of a deformable, above that around it \[Pa\].
+    CavityPressure,
+    /// Volume of all cavities of a deformable \[m³\].
+    CavityVolume,
 }
 
 /// What is taken of the values over time.
@@ -208,7 +212,13 @@ impl Quantity {
     pub fn is_soft(self) -> bool {
         matches!(
             self,
-            Self::VolumeRatio | Self::Penetration | Self::Stress | Self::Strain | Self::Deformation
+            Self::VolumeRatio
+                | Self::Penetration
+                | Self::Stress
+                | Self::Strain
+                | Self::Deformation
+                | Self::CavityPressure
+                | Self::CavityVolume
         )
     }
 
@@ -234,7 +244,8 @@ impl Quantity {
             | Self::Energy
             | Self::StepLoss
             | Self::EnergyBalance => "J",
-            Self::Stress => "Pa",
+            Self::Stress | Self::CavityPressure => "Pa",
+            Self::CavityVolume => "m³",
             Self::VolumeRatio | Self::Strain => "",
         }
     }

@@ -14,8 +14,8 @@ mod values;
 
 pub use control::{Attach, Move};
 pub use deformable::{
-    Body, Deformable, Elasticity, Fidelity, Frames, Integrator, Material, Region, RegionMaterial, Regions,
-    Solver, SolverKind, System,
+    Body, Deformable, Elasticity, Fidelity, Filling, Frames, Integrator, Material, Region, RegionMaterial,
+    Regions, Solver, SolverKind, System,
 };
 pub use drop::{Axis, Drop, Entry, Mode, Orientations, Random, Range, Scale, Sweep};
 pub use expectation::{Curve, Expect, Holds, Probe, Quantity, Take};

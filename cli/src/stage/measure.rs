@@ -88,6 +88,14 @@ impl Stage {
             }
             Quantity::Stress | Quantity::Strain => largest_of_elements(quantity, body).0,
             Quantity::Deformation => deformation(body),
+            Quantity::CavityPressure => {
+                let pressures =
+                    (0..body.model().cavities().len()).filter_map(|k| body.cavity_pressure(k).ok());
+                pressures.fold(f64::NAN, f64::max)
+            }
+            Quantity::CavityVolume => {
+                (0..body.model().cavities().len()).filter_map(|k| body.cavity_volume(k).ok()).sum()
+            }
             _ => f64::NAN,
         }
     }

@@ -30,8 +30,13 @@ fn polyline(points: &[[f32; 3]], segments: usize) -> Vec<Vector> {
 /// The shape of a deformable.
 fn mesh(body: &scene::Deformable, folder: &Path) -> Result<DeformableBodyBuilder, String> {
     Ok(match body.body.as_ref() {
-        Body::Lattice { half_extents, cells } => {
+        Body::Lattice { half_extents, cells, hollows } if hollows.is_empty() => {
             DeformableBodyBuilder::cuboid((*half_extents).into(), *cells)
+        }
+        Body::Lattice { half_extents, cells, hollows } => {
+            let whole = TetMesh::cuboid(half_extents.map(f64::from), *cells).map_err(|e| e.to_string())?;
+            let hollow = whole.without(|x| hollows.iter().any(|hollow| is_within(hollow, x)));
+            DeformableBodyBuilder::mesh(&hollow.map_err(|e| format!("`hollows`: {e}"))?)
         }
         Body::Filled { shape, cell_size } => DeformableBodyBuilder::filled(
             &*simple_shape(shape).ok_or("`filled` fills simple shapes")?,
@@ -70,17 +75,35 @@ fn with_groups(
     })
 }
 
+fn is_within(region: &scene::Region, x: [f64; 3]) -> bool {
+    (0..3).all(|k| (f64::from(region.min[k])..=f64::from(region.max[k])).contains(&x[k]))
+}
+
+/// What fills the cavities of a body; their volumes are those of the shape at rest.
+fn filled(builder: DeformableBodyBuilder, body: &scene::Deformable) -> Result<DeformableBodyBuilder, String> {
+    if body.cavities.is_empty() {
+        return Ok(builder);
+    }
+    let built = builder.build().map_err(|e| e.to_string())?;
+    let rooms: Vec<f64> = built.model().cavities().map(|cavity| cavity.volume).collect();
+    if body.cavities.len() > rooms.len() {
+        let (asked, found) = (body.cavities.len(), rooms.len());
+        return Err(format!("`cavities` fills {asked} closed rooms, but there are {found}"));
+    }
+    let filling =
+        |(filling, volume): (&toml::Spanned<scene::Filling>, &f64)| filling.as_ref().at_rest(*volume);
+    let fillings = body.cavities.iter().zip(&rooms).map(filling).enumerate();
+    Ok(fillings.fold(builder, |builder, (cavity, filling)| builder.fill_cavity(cavity, filling)))
+}
+
 /// Materials of boxes; later ones over earlier ones. Region 0 is what is in none.
 fn with_boxes(builder: DeformableBodyBuilder, regions: &Regions) -> DeformableBodyBuilder {
     let boxes: Vec<scene::Region> = regions.iter().filter_map(|region| region.as_ref().within).collect();
     if boxes.is_empty() {
         return builder;
     }
-    let builder = builder.regions(|x| {
-        let within =
-            |r: &scene::Region| (0..3).all(|k| (f64::from(r.min[k])..=f64::from(r.max[k])).contains(&x[k]));
-        boxes.iter().rposition(within).map_or(0, |k| k as u32 + 1)
-    });
+    let builder = builder
+        .regions(|x| boxes.iter().rposition(|region| is_within(region, x)).map_or(0, |k| k as u32 + 1));
     let numbered = regions.iter().enumerate();
     numbered.fold(builder, |builder, (k, region)| {
         builder.region_material(k as u32 + 1, region.as_ref().material.to_material())
@@ -161,7 +184,7 @@ pub(super) fn deformable(body: &scene::Deformable, folder: &Path) -> Result<Defo
         .material(body.material.as_ref().to_material())
         // What a scene expects of rest is to be found awake.
         .can_sleep(false);
-    let builder = builder.self_contact(body.self_contact);
+    let builder = filled(builder.self_contact(body.self_contact), body)?;
     Ok(match body.pinned.clone() {
         Some(regions) => builder.pinned(move |x| {
             let within = |r: &scene::Region| x.cmpge(r.min.into()).all() && x.cmple(r.max.into()).all();

@@ -21,6 +21,7 @@ impl BodyProblem {
             materials: body.materials.clone(),
             mass_damping: 0.0,
             activation: body.activation,
+            cavities: Vec::new(),
             h,
             dt: h,
             reach: h,
@@ -102,6 +103,7 @@ impl BodyProblem {
         self.materials.clone_from(&body.materials);
         self.mass_damping = body.model.mass_damping(&body.materials);
         self.activation = body.activation;
+        self.read_cavities(&body.fillings, &body.state.x);
         self.step_damping = self.scale;
         self.guard_retries = 0;
         self.is_rejected = false;

@@ -3,6 +3,7 @@
 mod problem;
 
 mod begin;
+mod cavities;
 mod energy_bound;
 mod finish;
 mod generalized_alpha;

@@ -4,6 +4,7 @@
 //! `s = x_n + h v_n + h² M⁻¹ f_ext` [Bouaziz et al. 2014], E the elastic energy with the stiffness
 //! damping of the step. The residual is `r = −∂Ψ/∂x` \[N\]; pinned nodes are not unknowns.
 
+use super::cavities::FilledCavity;
 use super::generalized_alpha::{ALPHA_F, AlphaStart};
 use crate::body::{Impact, PrescribedNode, SolverSettings};
 use crate::fem::elastic_forces::Evaluation;
@@ -54,6 +55,7 @@ pub(crate) struct BodyProblem {
     /// α [1/s].
     pub(super) mass_damping: f64,
     pub(super) activation: f64,
+    pub(super) cavities: Vec<FilledCavity>,
     /// The step that the objective is of \[s\], and that by which time goes on.
     pub(super) h: f64,
     pub(super) dt: f64,
@@ -114,7 +116,7 @@ pub(crate) struct Iterate {
     pub r: Vec<Vec3>,
     /// Ψ \[J\].
     pub objective: f64,
-    /// E, with the stiffness damping of the step \[J\].
+    /// E, with the stiffness damping of the step, less the work of what fills cavities \[J\].
     pub elastic: f64,
     /// Least `tr(QᵀR)` of the elements against the body's frame.
     pub least_trace: f64,
@@ -274,16 +276,17 @@ impl BodyProblem {
         at.r.resize(at.x.len(), Vec3::zeros());
         let (model, materials, activation) = (&*self.model, &self.materials, self.activation);
         let elements = Elements { model, materials, activation };
-        let place =
-            Evaluation { damping: &self.damping, x: &at.x, frame: &self.frame, limit: limit / self.scale };
+        let filled = self.add_cavity_forces(at);
+        let limit = limit / self.scale - filled;
+        let place = Evaluation { damping: &self.damping, x: &at.x, frame: &self.frame, limit };
         let time = &mut self.preconditioner.counters.element_time;
         let elastic = timed(time, || elastic_forces::add_forces(&elements, &place, &mut at.r));
         self.preconditioner.counters.elements += elastic.evaluated;
-        if elastic.energy == f64::INFINITY {
+        at.elastic = elastic.energy + filled;
+        if at.elastic == f64::INFINITY {
             at.objective = f64::INFINITY;
             return;
         }
-        at.elastic = elastic.energy;
         at.least_trace = elastic.least_trace;
         if self.scale != 1.0 {
             at.r.iter_mut().for_each(|r| *r *= self.scale);
@@ -297,7 +300,7 @@ impl BodyProblem {
             at.r[i] += (from_target * inertia - moved * drag) * m;
             kinetic += m * (inertia * from_target.norm_squared() + drag * moved.norm_squared());
         }
-        at.objective = elastic.energy * self.scale + 0.5 * kinetic;
+        at.objective = at.elastic * self.scale + 0.5 * kinetic;
     }
 
     /// Factors of the masses in Ψ [1/s²], before distances to the target and from the start.
@@ -326,7 +329,7 @@ impl BodyProblem {
         }
         let promised = 0.1 * (by_contact + by_residual);
         // Ψ is a sum over the elements: its rounding is below 1e-13 of its terms.
-        let rounding = 1e-12 * (self.trial.objective + self.current.objective + by_contact.abs());
+        let rounding = 1e-12 * (self.trial.objective.abs() + self.current.objective.abs() + by_contact.abs());
         self.trial.objective - by_contact <= self.current.objective - promised + rounding
     }
 

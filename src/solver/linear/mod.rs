@@ -24,7 +24,9 @@ mod compliance_columns;
 mod factor_cache;
 mod unused_factors;
 
+mod low_rank;
 mod rigid_mode;
+mod turned;
 
 mod preconditioner;
 

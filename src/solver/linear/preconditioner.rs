@@ -10,7 +10,9 @@
 use super::clusters::TurnedClusters;
 use super::factor::FactorScratch;
 use super::factor_cache::SystemFactor;
+use super::low_rank::LowRank;
 use super::rigid_mode::RigidMode;
+use super::turned::solve_turned;
 use crate::fem::{DeformableModel, SystemMatrix, node_rotations};
 use crate::math::lanes::Lane;
 use crate::math::{Mat3, Vec3, rounded_rotation};
@@ -34,6 +36,7 @@ pub(crate) struct Preconditioner {
     clusters: TurnedClusters,
     /// The clusters take part.
     turns: bool,
+    low_rank: LowRank,
     rhs: Vec<Lane>,
     balanced: Vec<Vec3>,
     scratch: FactorScratch,
@@ -98,6 +101,7 @@ impl Preconditioner {
         self.turns = false;
         self.drifts = false;
         self.deflation.active = false;
+        self.low_rank.clear();
     }
 
     /// The body keeps its shape.
@@ -224,8 +228,26 @@ impl Preconditioner {
         self.deflation = d;
     }
 
+    /// Begins anew with what single directions resist.
+    pub fn clear_low_rank(&mut self) {
+        self.version += 1;
+        self.low_rank.clear();
+    }
+
+    /// Lets the direction `g` of forces be resisted by a stiffness.
+    pub fn add_low_rank(&mut self, factor: &SystemFactor, g: &[Vec3], stiffness: f64) {
+        let mut u = self.low_rank.room(g.len());
+        self.apply(factor, g, &mut u);
+        self.low_rank.push(g, u, stiffness);
+    }
+
     /// `out = P r`: displacements \[m\] of forces \[N\].
     pub fn apply(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
+        self.apply_full_rank(factor, r, out);
+        self.low_rank.take_off(r, out);
+    }
+
+    fn apply_full_rank(&mut self, factor: &SystemFactor, r: &[Vec3], out: &mut [Vec3]) {
         if self.is_rigid() {
             return self.rigid.apply(r, out);
         }
@@ -278,7 +300,7 @@ impl Preconditioner {
     /// Whether the body moves as P without more than frames around the inverse: no rigid shape, no deflation, nothing of
     /// another step.
     pub fn is_framed(&self) -> bool {
-        !self.is_rigid() && !self.deflation.active && !self.drifts
+        !self.is_rigid() && !self.deflation.active && !self.drifts && self.low_rank.is_empty()
     }
 
     /// Whether the body moves as a rigid one.
@@ -318,6 +340,7 @@ impl Preconditioner {
             FrameKind::Isotropic => *inverse_block,
             _ => self.frame(i) * inverse_block * self.frame(j).transpose(),
         };
+        let block = block - self.low_rank.compliance(i, j);
         let d = &self.deflation;
         if !d.active {
             return block;
@@ -329,7 +352,7 @@ impl Preconditioner {
     pub fn block_form(&self) -> BlockForm {
         match (self.one_frame(), self.kind) {
             (Some(frame), _) => BlockForm::OneFrame(frame),
-            (None, FrameKind::PerNode) => BlockForm::NodeFrames,
+            (None, FrameKind::PerNode) if self.low_rank.is_empty() => BlockForm::NodeFrames,
             _ => BlockForm::Other,
         }
     }
@@ -346,7 +369,7 @@ impl Preconditioner {
     /// The one frame of the body, if it has one and that is all there is to its blocks.
     pub fn one_frame(&self) -> Option<Mat3> {
         match self.kind {
-            _ if self.deflation.active || self.turns => None,
+            _ if self.deflation.active || self.turns || !self.low_rank.is_empty() => None,
             FrameKind::Isotropic => Some(Mat3::identity()),
             FrameKind::Floating => Some(self.floating),
             FrameKind::PerNode | FrameKind::Rigid => None,
@@ -356,28 +379,5 @@ impl Preconditioner {
     /// Whether every node has a frame of its own, as in bodies that bend.
     pub fn is_per_node(&self) -> bool {
         self.kind == FrameKind::PerNode
-    }
-}
-
-/// `out = Q A⁻¹ Qᵀ r`, node by node: `turn_back` is Qᵀ, `turn` is Q.
-fn solve_turned(
-    factor: &SystemFactor,
-    turn_back: impl Fn(usize, Vec3) -> Vec3,
-    turn: impl Fn(usize, Vec3) -> Vec3,
-    r: &[Vec3],
-    out: &mut [Vec3],
-    rhs: &mut Vec<Lane>,
-    scratch: &mut FactorScratch,
-) {
-    rhs.resize(r.len(), Lane::default());
-    let places = factor.symbolic.places();
-    for (i, (r, &place)) in r.iter().zip(places).enumerate() {
-        let turned = turn_back(i, *r);
-        rhs[place] = Lane([turned.x, turned.y, turned.z, 0.0]);
-    }
-    factor.symbolic.solve(&factor.factor, rhs, scratch);
-    for (i, (out, &place)) in out.iter_mut().zip(places).enumerate() {
-        let [x, y, z, _] = rhs[place].0;
-        *out = turn(i, Vec3::new(x, y, z));
     }
 }

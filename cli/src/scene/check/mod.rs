@@ -248,6 +248,9 @@ fn check_bodies(scene: &Scene) -> Result<(), Mistake> {
         let material = body.material.as_ref().to_material().validate();
         material.map_err(|what| (body.material.span(), format!("`material`: {what}")))?;
         check_regions(body)?;
+        // Of any room: what is wrong with one of a cubic metre is so with all.
+        let wrong = body.cavities.iter().find_map(|c| Some((c.span(), c.as_ref().at_rest(1.0).fault()?)));
+        wrong.map_or(Ok(()), |(at, what)| Err((at, format!("`cavities`: {what}"))))?;
     }
     Ok(())
 }

@@ -66,7 +66,7 @@ fn cells_problem(cells: &[usize]) -> Option<String> {
 
 pub(super) fn body_problem(body: &Body) -> Option<String> {
     match body {
-        Body::Lattice { half_extents, cells } | Body::Network { half_extents, cells } => {
+        Body::Lattice { half_extents, cells, .. } | Body::Network { half_extents, cells } => {
             cells_problem(cells).or_else(|| shape_problem(&Shape::Cuboid { half_extents: *half_extents }))
         }
         Body::Filled { shape, cell_size } => {
