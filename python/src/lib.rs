@@ -1,0 +1,87 @@
+//! The extension module of the Python package `foible3d`: a world of its own, of rapier3d's rigid bodies and foible3d's
+//! deformable ones, as two extension modules share no types of Rust's.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `errors`, `arrays`, `options`, `enums`, `handles` | what goes between Python and Rust |
+//! | `world`, `snapshots`, `counters`, `batch` | the world, its bytes, what a step did, many worlds |
+//! | `bodies`, `sets` | putting things in and out, and finding them |
+//! | `rigid*`, `collider*`, `joint*` | rapier's |
+//! | `material`, `deformable*`, `attachments`, `contacts` | foible3d's |
+
+mod arrays;
+mod attachments;
+mod batch;
+mod bodies;
+mod collider;
+mod collider_builder;
+mod contacts;
+mod counters;
+mod deformable;
+mod deformable_builder;
+mod deformable_cavities;
+mod deformable_controls;
+mod deformable_forces;
+mod deformable_shapes;
+mod enums;
+mod errors;
+mod handles;
+mod joint_builder;
+mod joints;
+mod material;
+mod options;
+mod rigid;
+mod rigid_builder;
+mod rigid_forces;
+mod sets;
+mod snapshots;
+mod world;
+
+/// The compiled part of foible3d; import from ``foible3d``.
+#[pyo3::pymodule(name = "_native")]
+mod native {
+    #[pymodule_export]
+    use crate::attachments::Attachment;
+    #[pymodule_export]
+    use crate::batch::step_all;
+    #[pymodule_export]
+    use crate::collider::PyCollider;
+    #[pymodule_export]
+    use crate::collider_builder::PyColliderBuilder;
+    #[pymodule_export]
+    use crate::deformable::PyDeformableBody;
+    #[pymodule_export]
+    use crate::deformable_builder::PyDeformableBuilder;
+    #[pymodule_export]
+    use crate::enums::{
+        PyBodyType, PyCombineRule, PyElasticity, PyFidelity, PyGroups, PyIntegrator, PyJointAxis,
+        PyMotorModel,
+    };
+    #[pymodule_export]
+    use crate::handles::{
+        PyAttachmentHandle, PyColliderHandle, PyDeformableHandle, PyJointHandle, PyRigidBodyHandle,
+    };
+    #[pymodule_export]
+    use crate::joint_builder::{FixedJoint, PrismaticJoint, PyJointBuilder, RevoluteJoint, SphericalJoint};
+    #[pymodule_export]
+    use crate::joints::PyJoint;
+    #[pymodule_export]
+    use crate::material::PyMaterial;
+    #[pymodule_export]
+    use crate::rigid::PyRigidBody;
+    #[pymodule_export]
+    use crate::rigid_builder::PyRigidBodyBuilder;
+    #[pymodule_export]
+    use crate::sets::{AttachmentSet, ColliderSet, DeformableBodySet, ImpulseJointSet, RigidBodySet};
+    #[pymodule_export]
+    use crate::world::World;
+
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "the name that Python has for it")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+
+    #[pymodule_init]
+    fn load() {
+        crate::batch::note_process();
+    }
+}
