@@ -1,14 +1,14 @@
 //! What fills a closed room of a body: its pressure as a function of the room's volume, and the work that it does.
 
 /// What fills a cavity of a body. Pressures are above that around the body, which acts on everything alike, unless said
-/// otherwise.
+/// otherwise. It has no mass, and so no pressure that grows with depth: give that of a liquid to the walls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum CavityFilling {
     /// The same pressure at any volume, as of a pump that follows.
     Pressure {
-        /// Above that around the body; below zero it sucks \[Pa\].
+        /// Above that around the body; below zero it sucks, until there is no room left \[Pa\].
         gauge: f64,
     },
     /// A sealed amount of gas: `(gauge + ambient)·Vⁿ` stays.
@@ -35,6 +35,8 @@ impl CavityFilling {
     /// Pressure above that around the body \[Pa\] at a volume \[m³\]; of a gas without room it is infinite.
     pub fn pressure(&self, at: f64) -> f64 {
         match *self {
+            // What is sucked empty is not turned inside out.
+            Self::Pressure { gauge } if gauge < 0.0 && at <= 0.0 => 0.0,
             Self::Pressure { gauge } => gauge,
             Self::Gas { gauge, ambient, volume, exponent } if at > 0.0 => {
                 (gauge + ambient) * (volume / at).powf(exponent) - ambient
@@ -48,6 +50,7 @@ impl CavityFilling {
     pub(crate) fn work(&self, from: f64, to: f64) -> f64 {
         let grown = to - from;
         match *self {
+            Self::Pressure { gauge } if gauge < 0.0 => gauge * (to.max(0.0) - from.max(0.0)),
             Self::Pressure { gauge } => gauge * grown,
             Self::Gas { ambient, exponent, .. } if from > 0.0 && to > 0.0 => {
                 // ∫ p dV of p Vⁿ = c, without a difference of nearly equal powers.
