@@ -420,7 +420,8 @@ fn every_solver_frame_matrix_and_integrator_comes_to_the_same_pressure() {
         "tip {:.6} m, sealed {:.2} Pa, {:.1e} m/s, {} iterations",
         wanted.0, wanted.1, wanted.2, wanted.3
     );
-    let others: [(&str, &dyn Fn(&mut SolverSettings)); 7] = [
+    type Change<'a> = &'a dyn Fn(&mut SolverSettings);
+    let others: [(&str, Change<'_>); 7] = [
         ("Newton", &|s| s.solver = Solver::Newton),
         ("conjugate gradients", &|s| s.solver = Solver::ConjugateGradients),
         ("Laplacian", &|s| s.system = SystemMatrix::Laplacian),
