@@ -172,3 +172,43 @@ fn a_sealed_block_keeps_its_gas() {
         assert!(said.contains(says), "{said}");
     }
 }
+
+/// Blocks below hooks: one on a cable, one on a spring of 800 N/m by vertex, one on what bears less than it weighs.
+#[test]
+fn attachments_may_be_cables_springs_and_break() {
+    let text = |third: &str| {
+        let hook = |k: usize| {
+            format!(
+                "{{ name = \"hook {k}\", kind = \"fixed\", shape = {{ ball = {{ radius = 0.01 }} }}, translation = [{k}, 0.2, 0], collides = false }}"
+            )
+        };
+        let block = |k: usize| {
+            format!(
+                "{{ name = \"block {k}\", body = {{ lattice = {{ half_extents = [0.05, 0.05, 0.05], cells = [2, 2, 2] }} }}, translation = [{k}, 0, 0],
+                material = {{ youngs_modulus = 1e7, poisson_ratio = 0.3, density = 1000, mass_damping = 5 }} }}"
+            )
+        };
+        let attach = |k: usize, what: &str| {
+            format!(
+                "{{ deformable = \"block {k}\", to = \"hook {k}\", region = {{ min = [{k}.0, 0.049, -0.01], max = [{k}.01, 0.051, 0.01] }}, {what} }}"
+            )
+        };
+        let of = |make: &dyn Fn(usize) -> String| [1, 2, 3].map(make).join(", ");
+        format!(
+            "world = {{ duration = 3.0, dt = 0.01 }}\nrigid = [{}]\ndeformable = [{}]\nattach = [{}]\nmeasure = [{}]\n",
+            of(&hook),
+            of(&block),
+            [attach(1, "length = 0.3"), attach(2, "compliance = 1.25e-3"), attach(3, third)].join(", "),
+            of(&|k| format!("{{ name = \"y {k}\", quantity = \"y\", of = \"block {k}\" }}")),
+        )
+    };
+    let hang = outcome(&text("break_force = 5.0"));
+    let [cable, spring, broken] = ["y 1", "y 2", "y 3"].map(|name| number(&hang, name));
+    // 1 kg: the cable is taut at its length, the spring is drawn out by m g/k.
+    assert!((cable + 0.3).abs() < 1e-3, "{cable}");
+    assert!((spring + 9.81 * 1.25e-3).abs() < 1e-3, "{spring}");
+    // Damped by 5/s: it falls at 2 m/s.
+    assert!(broken < -5.0, "{broken}");
+    let said = foible_cli::scene::parse(&text("break_force = 0.0")).unwrap_err().to_string();
+    assert!(said.contains("`break_force` is 0, but must be positive"), "{said}");
+}

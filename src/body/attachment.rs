@@ -26,7 +26,9 @@ pub struct DeformableAttachment {
     /// Nodes of the body.
     pub(crate) nodes: Vec<u32>,
     pub(crate) anchors: Anchors,
+    #[cfg_attr(feature = "serde-serialize", serde(with = "crate::math::finite_or_none"))]
     compliance: f64,
+    #[cfg_attr(feature = "serde-serialize", serde(with = "crate::math::finite_or_none"))]
     length: f64,
     #[cfg_attr(feature = "serde-serialize", serde(with = "crate::math::finite_or_none"))]
     break_force: f64,

@@ -17,6 +17,15 @@ pub struct Attach {
     pub to: Spanned<String>,
     /// Surface vertices in this box of the world are held where they are.
     pub region: Region,
+    /// What each vertex gives way by per force \[m/N\]; none if not given.
+    #[schemars(with = "Option<f64>")]
+    pub compliance: Option<Spanned<f64>>,
+    /// Cables of this length \[m\] instead: vertices may go so far from where they are, and are pushed nowhere.
+    #[schemars(with = "Option<f64>")]
+    pub length: Option<Spanned<f64>>,
+    /// Force \[N\] on all of its vertices together at which it breaks.
+    #[schemars(with = "Option<f64>")]
+    pub break_force: Option<Spanned<f64>>,
 }
 
 /// How a kinematic body moves beside its velocities: smoothly by a vector, or to and fro by it.

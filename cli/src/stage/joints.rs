@@ -58,6 +58,11 @@ impl Stage {
         let to = AttachTo::RigidBody(*rigid, *self.physics.bodies[*rigid].position());
         let made = self.world.bodies.attach(*soft, &vertices, to);
         let handle = made.map_err(|e| format!("attach: \"{name}\": {e}"))?;
+        if let Some(made) = self.world.bodies.attachment_mut(handle) {
+            attach.compliance.iter().for_each(|compliance| made.set_compliance(*compliance.as_ref()));
+            attach.length.iter().for_each(|length| made.set_length(*length.as_ref()));
+            attach.break_force.iter().for_each(|force| made.set_break_force(*force.as_ref()));
+        }
         self.attachments.push((name.clone(), handle));
         Ok(())
     }

@@ -169,6 +169,16 @@ fn check_control(scene: &Scene) -> Result<(), Mistake> {
         if !rigid.contains(&attach.to.as_ref().as_str()) {
             return Err(unknown(&attach.to, "to", "a rigid body", &rigid));
         }
+        let keys = [
+            ("compliance", &attach.compliance),
+            ("length", &attach.length),
+            ("break_force", &attach.break_force),
+        ];
+        for (key, value) in keys.into_iter().filter_map(|(key, value)| Some((key, value.as_ref()?))) {
+            if !(*value.as_ref() > 0.0 && value.as_ref().is_finite()) {
+                return Err((value.span(), format!("`{key}` is {}, but must be positive", value.as_ref())));
+            }
+        }
     }
     for motion in &scene.moves {
         let kinematic = scene.rigid.iter().filter(|r| r.kind == Kind::Kinematic);
