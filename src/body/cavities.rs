@@ -20,25 +20,22 @@ impl DeformableBody {
     /// ```
     /// use foible3d::prelude::*;
     /// use rapier3d::prelude::*;
-    /// // A balloon: a closed sheet of rubber, blown up and sealed.
-    /// let (vertices, triangles) = Ball::new(0.1).to_trimesh(16, 8);
-    /// let balloon = SurfaceMesh { vertices, triangles };
-    /// # let balloon = balloon.repaired(SurfaceRepair::default())?.surface;
-    /// let corners = balloon.vertices.iter().map(|v| v.to_array().map(f64::from)).collect();
-    /// let sheet = Structure::sheet(corners, &balloon.triangles, 1.0e-3)?;
-    /// let mut balloon = DeformableBodyBuilder::structure(&sheet)
+    /// // A rubber bag: a closed sheet, here a tetrahedron, blown up and sealed.
+    /// let corners = vec![[0.0; 3], [0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.2]];
+    /// let faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+    /// let sheet = Structure::sheet(corners, &faces, 1.0e-3)?;
+    /// let mut bag = DeformableBodyBuilder::structure(&sheet)
     ///     .material(DeformableMaterial::new(1.0e6, 0.45).mass_damping(5.0))
     ///     .build()?;
-    /// balloon.fill_cavity(0, Some(CavityFilling::Pressure { gauge: 500.0 }))?;
+    /// bag.fill_cavity(0, Some(CavityFilling::Pressure { gauge: 500.0 }))?;
     /// let (mut physics, mut deformables) = (PhysicsWorld::new(), DeformableWorld::new());
     /// physics.gravity = Vector::ZERO;
-    /// let balloon = deformables.bodies.insert_body(balloon);
+    /// let bag = deformables.bodies.insert_body(bag);
     /// for _ in 0..60 {
     ///     deformables.step(&mut physics);
     /// }
-    /// let body = &mut deformables.bodies[balloon];
-    /// let grown = body.cavity_volume(0)? / body.model().cavities().next().unwrap().volume;
-    /// assert!(grown > 1.03 && grown < 1.2);
+    /// let body = &mut deformables.bodies[bag];
+    /// assert!(body.cavity_volume(0)? > 1.01 * body.model().cavities().next().unwrap().volume);
     /// // What is in it now stays in it.
     /// body.seal_cavity(0, 101_325.0, 1.4)?;
     /// assert!((body.cavity_pressure(0)? - 500.0).abs() < 1.0e-9);
