@@ -23,6 +23,11 @@ fn what_is_dragged_hangs_on_its_spring_below_the_ray_and_falls_when_let_go() {
     assert!(world.bodies[body].is_sleeping());
     // The front, 2.9 m away.
     let at = Vector::new(0.0, 0.1, 0.1);
+    let held = world.bodies.cast_ray(EYE, towards(at), 10.0, |_, _| true).unwrap();
+    let height = |world: &DeformableWorld| {
+        held.vertices.iter().map(|v| world.bodies[body].position(*v).unwrap()[1]).sum::<f64>() / 3.0
+    };
+    let before = height(&world);
     let mut drag = DeformableDrag::pick(&mut world.bodies, EYE, towards(at), 10.0).unwrap();
     assert_eq!(drag.body(), body);
     let distance = towards(at).length();
@@ -31,6 +36,7 @@ fn what_is_dragged_hangs_on_its_spring_below_the_ray_and_falls_when_let_go() {
         drag.lead(&mut world.bodies, EYE, towards(target) * 7.0);
         world.step(&mut physics);
     }
+    let hangs = before + f64::from(target.y - held.point.y) - height(&world);
     let body = &world.bodies[body];
     let middle = Vector::from(body.center_of_mass().map(|c| c as f32));
     assert!(body.max_speed() < 1e-3);
@@ -39,6 +45,8 @@ fn what_is_dragged_hangs_on_its_spring_below_the_ray_and_falls_when_let_go() {
     let carried: Vec<f64> = world.bodies.attachments().map(|(_, a)| f64::from(a.force().y)).collect();
     assert!((carried[0] - 9.81 * body.mass()).abs() < 0.01 && carried.len() == 1, "{carried:?}");
     let sag = 9.81 / (std::f64::consts::TAU * 3.0).powi(2);
+    println!("hangs {hangs} m below where it is led, {sag} expected");
+    assert!((hangs - sag).abs() < 0.01 * sag, "{hangs} {sag}");
     let below = target - middle - Vector::Y * (0.1 + sag as f32);
     println!("{middle} below {target}: {below} from where it would hang by its middle");
     assert!(below.abs().max_element() < 0.034, "{below}");

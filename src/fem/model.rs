@@ -288,6 +288,7 @@ impl DeformableModel {
             + self.volume_domains.bytes()
             + size_of_val(&self.surface.triangles[..]) * 2
             + size_of_val(&self.surface.edges[..])
+            + self.cavities.iter().map(|cavity| size_of_val(&cavity.triangles[..])).sum::<usize>()
             + 12 * self.rest.len()
             + size_of_val(self.structure.vertices())
             + size_of_val(self.structure.tetrahedra())

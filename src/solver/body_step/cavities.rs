@@ -42,14 +42,16 @@ impl BodyProblem {
         energy
     }
 
-    /// Lets the preconditioner know what the fillings resist where the iteration is; true if there are such.
+    /// Lets the preconditioner know what the fillings resist where the iteration is; true if any does. A pressure at any volume
+    /// resists nothing: P and W stay.
     pub fn refresh_cavities(&mut self, factor: &SystemFactor) -> bool {
-        if self.cavities.is_empty() || self.preconditioner.is_rigid() {
+        let resists = |filled: &FilledCavity| !matches!(filled.filling, CavityFilling::Pressure { .. });
+        if self.preconditioner.is_rigid() || !self.cavities.iter().any(resists) {
             return false;
         }
         self.preconditioner.clear_low_rank();
         let mut gradient = std::mem::take(&mut self.force);
-        for FilledCavity { cavity, filling, .. } in &self.cavities {
+        for FilledCavity { cavity, filling, .. } in self.cavities.iter().filter(|filled| resists(filled)) {
             let room = &self.model.cavities[*cavity];
             let stiffness = filling.stiffness(room.volume(&self.current.x));
             if !(stiffness > 0.0) {
