@@ -44,6 +44,18 @@ pub enum BodyError {
         /// What is wrong.
         what: &'static str,
     },
+    /// What no cable has.
+    #[error("the cable cannot be: {what}")]
+    BadCable {
+        /// What is wrong.
+        what: &'static str,
+    },
+    /// A place that no tetrahedron of the body holds.
+    #[error("{point:?} is not inside of the body")]
+    NotInside {
+        /// The place \[m\].
+        point: Vector,
+    },
     /// A state of another mesh, or lists of vertices to attach that do not go together.
     #[error("{vertices} vertices are given where {expected} are expected")]
     WrongSize {

@@ -89,10 +89,11 @@ mod pipeline;
 mod export;
 
 pub use body::{
-    Acceleration, AttachTo, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
-    DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableContact,
-    DeformableContactPartner, DeformablePairContact, DeformableState, DeformableStress, DeformableWind,
-    FactorPrecision, Fidelity, Frames, Integrator, JointRole, Solver, SolverSettings,
+    Acceleration, AttachTo, CablePoint, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
+    DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableCable, DeformableCableBuilder,
+    DeformableCableHandle, DeformableContact, DeformableContactPartner, DeformablePairContact,
+    DeformableState, DeformableStress, DeformableWind, FactorPrecision, Fidelity, Frames, Integrator,
+    JointRole, Solver, SolverSettings,
 };
 pub use contact::{DeformableDrag, DeformableSurfacePoint};
 pub use coupling::{
@@ -121,17 +122,17 @@ pub use solver::DeformableMode;
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
 pub mod prelude {
     pub use crate::{
-        Acceleration, AttachTo, CavityFilling, DeformableAttachment, DeformableAttachmentHandle,
+        Acceleration, AttachTo, CablePoint, CavityFilling, DeformableAttachment, DeformableAttachmentHandle,
         DeformableBody, DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
-        DeformableChannelEventCollector, DeformableColliders, DeformableCollisionEvent, DeformableContact,
-        DeformableContactForceEvent, DeformableContactModificationContext, DeformableContactPartner,
-        DeformableCounters, DeformableDrag, DeformableEventHandler, DeformableHooks, DeformableMaterial,
-        DeformableMode, DeformableModel, DeformablePairContact, DeformablePairFilterContext,
-        DeformableParameters, DeformablePipeline, DeformableRest, DeformableSkin, DeformableSolverContact,
-        DeformableStress, DeformableSurfaceMesh, DeformableSurfacePoint, DeformableWind, DeformableWorld,
-        Elasticity, FactorPrecision, Fidelity, Frames, Integrator, JointForce, JointRole, MaxwellBranch,
-        PhysicsParts, RigidContact, SolvedJoint, Solver, SolverSettings, Structure, SurfaceMesh,
-        SurfaceRepair, SystemMatrix, TetMesh,
+        DeformableCable, DeformableCableBuilder, DeformableCableHandle, DeformableChannelEventCollector,
+        DeformableColliders, DeformableCollisionEvent, DeformableContact, DeformableContactForceEvent,
+        DeformableContactModificationContext, DeformableContactPartner, DeformableCounters, DeformableDrag,
+        DeformableEventHandler, DeformableHooks, DeformableMaterial, DeformableMode, DeformableModel,
+        DeformablePairContact, DeformablePairFilterContext, DeformableParameters, DeformablePipeline,
+        DeformableRest, DeformableSkin, DeformableSolverContact, DeformableStress, DeformableSurfaceMesh,
+        DeformableSurfacePoint, DeformableWind, DeformableWorld, Elasticity, FactorPrecision, Fidelity,
+        Frames, Integrator, JointForce, JointRole, MaxwellBranch, PhysicsParts, RigidContact, SolvedJoint,
+        Solver, SolverSettings, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix, TetMesh,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

@@ -55,6 +55,7 @@ fn edges_forces_pins_and_attachments_are_drawn_in_their_colours() {
     assert_eq!(of(style.edge_color).len(), 36);
     assert_eq!(of(style.pin_color).len(), 12);
     assert_eq!(of(style.attachment_color).len(), 2);
+    assert_eq!(of(style.cable_color).len(), 0);
     let arrows = of(style.force_color);
     let carrying = world.contacts_with(floor).filter(|c| c.body == body && c.force != Vector::ZERO).count();
     assert!(carrying > 0 && arrows.len() >= 3 * carrying && arrows.len() % 3 == 0);

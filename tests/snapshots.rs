@@ -142,7 +142,7 @@ fn a_snapshot_is_small_and_models_are_shared() {
     assert_eq!(postcard::to_stdvec(&loaded).unwrap(), bytes, "what is loaded is what was saved");
 }
 
-/// Everything that a set holds: sheets, ropes, fibres, smoothed bodies, kinds, pins, wind, attachments, gaps in the slots.
+/// Everything that a set holds: sheets, ropes, fibres, smoothed bodies, kinds, pins, wind, attachments, a cable, gaps in the slots.
 fn menagerie() -> (PhysicsWorld, DeformableWorld) {
     let (mut physics, _) = world_with_floor(H);
     let mut world = DeformableWorld::new();
@@ -174,6 +174,12 @@ fn menagerie() -> (PhysicsWorld, DeformableWorld) {
         physics.insert(RigidBodyBuilder::dynamic().translation(at(6)), ColliderBuilder::ball(0.1));
     let to = AttachTo::RigidBody(carrier, *physics.bodies[carrier].position());
     world.bodies.attach(handles[4], &[0, 1], to).unwrap();
+    let points = [
+        CablePoint::Vertex(handles[0], 7),
+        CablePoint::RigidBody(carrier, Vector::Y * 0.05),
+        CablePoint::World(at(6) + Vector::Y),
+    ];
+    world.bodies.insert_cable(DeformableCableBuilder::new(points).friction(0.3).tension(2.0)).unwrap();
     world.remove(gone).unwrap();
     world.query_colliders = Some(DeformableColliders::new());
     (physics, world)

@@ -20,6 +20,8 @@ pub(crate) enum ConstraintKey {
     RigidPair(RigidPairContact),
     /// A vertex of an attachment.
     Attachment(AttachmentAxis),
+    /// Part of a cable.
+    Cable(CableRow),
 }
 
 /// A contact of a deformable body with a collider.
@@ -132,6 +134,26 @@ pub(crate) enum AttachmentDirection {
     Across(u32),
 }
 
+/// What a constraint is there for in a cable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct CableRow {
+    pub cable: u64,
+    pub part: CablePart,
+}
+
+/// Parts of a cable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) enum CablePart {
+    /// All of it, with the tension at the end that is drawn.
+    Pull,
+    /// What is before a point that rubs.
+    Guide(u32),
+    /// The part after a point, across it: the first or second tangent.
+    Across { part: u32, axis: u32 },
+}
+
 impl ConstraintKey {
     /// What a body touches there, if it names a contact of one.
     pub fn partner(&self) -> Option<Partner> {
@@ -147,11 +169,12 @@ impl ConstraintKey {
         matches!(self, Self::SoftPair(_))
     }
 
-    /// Whether it names a constraint that belongs to an island and not to one body: of rigid bodies, or of an attachment.
+    /// Whether it names a constraint that belongs to an island and not to one body: of rigid bodies, of an attachment or a cable.
     pub fn is_shared(&self) -> bool {
         match self {
             Self::Obstacle(_) | Self::SoftPair(_) => false,
-            Self::RigidPair(_) | Self::Joint(_) | Self::MultibodyJoint(_) | Self::Attachment(_) => true,
+            Self::RigidPair(_) | Self::Joint(_) | Self::MultibodyJoint(_) => true,
+            Self::Attachment(_) | Self::Cable(_) => true,
         }
     }
 }

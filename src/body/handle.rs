@@ -1,4 +1,4 @@
-//! Names of bodies and attachments.
+//! Names of bodies, attachments and cables.
 
 use crate::error::HandleError;
 use rapier3d::data::arena::Index;
@@ -32,6 +32,11 @@ impl DeformableBodyHandle {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct DeformableAttachmentHandle(pub(crate) u64);
+
+/// Names a cable of a [`DeformableBodySet`](super::DeformableBodySet); never used again after its removal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
+pub struct DeformableCableHandle(pub(crate) u64);
 
 /// What a deformable body touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -32,23 +32,29 @@ mod wind;
 mod builder;
 
 mod attachment;
+mod cable;
 mod set;
 #[cfg(feature = "serde-serialize")]
 mod snapshot;
 
 mod attach;
+mod cable_route;
 
 pub(crate) use attachment::{Anchors, PrescribedNode};
 pub use attachment::{AttachTo, DeformableAttachment};
 pub use body::DeformableBody;
 pub use builder::DeformableBodyBuilder;
+pub use cable::{CablePoint, DeformableCable, DeformableCableBuilder};
+pub(crate) use cable::{Guide, Winch};
 pub use constraint_memory::JointRole;
 pub(crate) use constraint_memory::{
-    AttachmentAxis, AttachmentDirection, ConstraintGeometry, ConstraintKey, ConstraintMemory, Feature,
-    JointAxis, ObstacleContact, RigidPairContact, SoftPairContact, SoftPairKind,
+    AttachmentAxis, AttachmentDirection, CablePart, CableRow, ConstraintGeometry, ConstraintKey,
+    ConstraintMemory, Feature, JointAxis, ObstacleContact, RigidPairContact, SoftPairContact, SoftPairKind,
 };
 pub use contacts::{DeformableContact, DeformablePairContact};
-pub use handle::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableContactPartner};
+pub use handle::{
+    DeformableAttachmentHandle, DeformableBodyHandle, DeformableCableHandle, DeformableContactPartner,
+};
 pub(crate) use impact::{Impact, Partner};
 pub use set::DeformableBodySet;
 pub use settings::{Acceleration, FactorPrecision, Fidelity, Frames, Integrator, Solver, SolverSettings};

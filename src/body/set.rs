@@ -3,7 +3,8 @@
 use super::attachment::DeformableAttachment;
 use super::body::DeformableBody;
 use super::builder::DeformableBodyBuilder;
-use super::handle::{DeformableAttachmentHandle, DeformableBodyHandle};
+use super::cable::DeformableCable;
+use super::handle::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableCableHandle};
 use super::slots::Slots;
 use super::touching::{Touch, TouchKey};
 use crate::error::DeformableBodyError;
@@ -19,6 +20,9 @@ pub struct DeformableBodySet {
     pub(super) attachments: BTreeMap<DeformableAttachmentHandle, DeformableAttachment>,
     /// How many there ever were.
     pub(super) attached: u64,
+    pub(super) cables: BTreeMap<DeformableCableHandle, DeformableCable>,
+    /// How many there ever were.
+    pub(super) cabled: u64,
     /// Rigid bodies that slept with bodies that were removed, for the next step to wake.
     pub(super) released: Vec<RigidBodyHandle>,
     /// What touches what, where events are wanted of it.
@@ -99,13 +103,14 @@ impl DeformableBodySet {
         self.attachments.values_mut()
     }
 
-    /// Takes a body out, and its attachments.
+    /// Takes a body out, and its attachments and cables.
     ///
     /// # Errors
     /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody).
     pub fn remove(&mut self, handle: DeformableBodyHandle) -> Result<DeformableBody, DeformableBodyError> {
         let mut body = self.bodies.remove(handle.0).ok_or_else(|| handle.no_such_body())?;
         self.attachments.retain(|_, attachment| !attachment.involves(handle));
+        self.cables.retain(|_, cable| cable.bodies().all(|body| body != handle));
         body.wake_up();
         self.released.append(&mut body.state.sleep.released);
         Ok(body)

@@ -2,7 +2,8 @@
 
 use super::attachment::{Anchors, DeformableAttachment};
 use super::body::{DeformableBody, Pin, StepReport};
-use super::handle::{DeformableAttachmentHandle, DeformableBodyHandle};
+use super::cable::{DeformableCable, Guide};
+use super::handle::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableCableHandle};
 use super::kinematics::Drive;
 use super::set::DeformableBodySet;
 use super::settings::SolverSettings;
@@ -24,7 +25,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 /// Of what is written. Another one is refused: numbers of another layout would be read as something else.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
 /// Comes first, so that nothing of another version is read.
 #[derive(Serialize)]
@@ -120,6 +121,8 @@ struct WrittenSet<'a> {
     slots: Vec<SlotRecord<WrittenBody<'a>>>,
     attachments: Vec<(&'a DeformableAttachmentHandle, &'a DeformableAttachment)>,
     attached: u64,
+    cables: Vec<(&'a DeformableCableHandle, &'a DeformableCable)>,
+    cabled: u64,
     released: &'a [RigidBodyHandle],
     touching: Vec<(&'a TouchKey, &'a Touch)>,
 }
@@ -132,6 +135,8 @@ struct ReadSet {
     slots: Vec<SlotRecord<ReadBody>>,
     attachments: Vec<(DeformableAttachmentHandle, DeformableAttachment)>,
     attached: u64,
+    cables: Vec<(DeformableCableHandle, DeformableCable)>,
+    cabled: u64,
     released: Vec<RigidBodyHandle>,
     touching: Vec<(TouchKey, Touch)>,
 }
@@ -157,6 +162,8 @@ impl Serialize for DeformableBodySet {
             slots,
             attachments: self.attachments.iter().collect(),
             attached: self.attached,
+            cables: self.cables.iter().collect(),
+            cabled: self.cabled,
             released: &self.released,
             touching: self.touching.iter().collect(),
         }
@@ -190,6 +197,7 @@ impl ReadSet {
         let mut set = DeformableBodySet {
             bodies: Slots::new(slots),
             attached: self.attached,
+            cabled: self.cabled,
             released: self.released,
             touching: self.touching.into_iter().collect(),
             ..DeformableBodySet::default()
@@ -200,11 +208,28 @@ impl ReadSet {
                 return Err(format!("attachment {} does not fit the bodies", handle.0));
             }
         }
+        for (handle, cable) in self.cables {
+            let is_known = handle.0 < set.cabled && set.carries(&cable);
+            if !is_known || set.cables.insert(handle, cable).is_some() {
+                return Err(format!("cable {} does not fit the bodies", handle.0));
+            }
+        }
         Ok(set)
     }
 }
 
 impl DeformableBodySet {
+    /// Whether bodies and nodes of a cable are there.
+    fn carries(&self, cable: &DeformableCable) -> bool {
+        cable.has_sound_numbers()
+            && cable.route.iter().all(|guide| match guide {
+                Guide::Soft(body, nodes, _) => self
+                    .get(*body)
+                    .is_some_and(|body| nodes.iter().all(|n| (*n as usize) < body.vertex_count())),
+                Guide::World(_) | Guide::Rigid(..) => true,
+            })
+    }
+
     /// Whether bodies and nodes of an attachment are there.
     fn fits(&self, attachment: &DeformableAttachment) -> bool {
         let has = |body: DeformableBodyHandle, nodes: &[u32]| {

@@ -28,19 +28,43 @@ pub(crate) enum Endpoint {
 pub(crate) enum Law {
     /// Pushes, and rubs within the friction cone.
     Contact { friction: f64 },
-    /// Holds in both directions along the normal, with no more than `limit` \[N\].
-    Bilateral { limit: f64 },
+    /// Acts along the normal with a force between two bounds \[N\]: in both directions, or only one, or with a given force.
+    Bounded { least: f64, most: f64 },
 }
 
-/// A contact. Forces are positive on endpoint 0 and negative on endpoint 1.
+impl Law {
+    /// Holds in both directions.
+    pub const BILATERAL: Self = Self::bilateral(f64::INFINITY);
+
+    /// Holds in both directions, with no more than `limit` \[N\].
+    pub const fn bilateral(limit: f64) -> Self {
+        Self::Bounded { least: -limit, most: limit }
+    }
+}
+
+/// A point that a constraint along a path acts on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PathPoint {
+    pub endpoint: Endpoint,
+    /// Force on the endpoint for each newton of the constraint, and what its motion adds to the gap.
+    pub direction: Vec3,
+}
+
+/// A contact, or what else binds points. Forces are positive on endpoint 0 and negative on endpoint 1.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Constraint {
     pub endpoints: [Endpoint; 2],
+    /// All that a constraint along a path acts on; empty of one between two endpoints. Its `endpoints` are idle then, and the
+    /// normal is only a place for its one component.
+    pub path: Vec<PathPoint>,
     /// Normal, from endpoint 1 to endpoint 0, and two tangents.
     pub frame: [Vec3; 3],
     /// Distance along the normal at the start of the step \[m\].
     pub gap: f64,
     pub law: Law,
+    /// Of a cable at a point that rubs: part of the tension on either side that may be lost there, `1 − e^(−μθ)`. The bounds of the
+    /// law follow the tensions.
+    pub loss: f64,
     /// Displacement per force that the constraint itself gives way by [m/N].
     pub compliance: f64,
     pub restitution: f64,
@@ -63,9 +87,11 @@ impl Constraint {
         let [t1, t2] = tangents(&normal);
         Self {
             endpoints,
+            path: Vec::new(),
             frame: [normal, t1, t2],
             gap,
             law: Law::Contact { friction: 0.0 },
+            loss: 0.0,
             compliance: 0.0,
             restitution: 0.0,
             surface_motion: Vec3::zeros(),
@@ -75,6 +101,42 @@ impl Constraint {
             warm_geometry: None,
             target_gap: gap,
         }
+    }
+
+    /// One along a path; `idle` is a proxy that does not yield.
+    pub fn along(path: Vec<PathPoint>, idle: ProxyId, gap: f64, law: Law, key: ConstraintKey) -> Self {
+        let nothing = Endpoint::Rotation { proxy: idle };
+        Self { path, law, ..Self::new([nothing; 2], Vec3::x(), gap, key) }
+    }
+
+    /// Everything that it acts on.
+    pub fn all_endpoints(&self) -> impl Iterator<Item = &Endpoint> + Clone {
+        self.endpoints.iter().chain(self.path.iter().map(|point| &point.endpoint))
+    }
+
+    /// The same, to be changed.
+    pub fn all_endpoints_mut(&mut self) -> impl Iterator<Item = &mut Endpoint> {
+        self.endpoints.iter_mut().chain(self.path.iter_mut().map(|point| &mut point.endpoint))
+    }
+
+    /// Lays a force, as [`Self::force`] gives it, on everything that it acts on.
+    pub fn for_each_force(&self, force: &Vec3, mut act: impl FnMut(&Endpoint, Vec3)) {
+        if self.path.is_empty() {
+            act(&self.endpoints[0], *force);
+            act(&self.endpoints[1], -force);
+        }
+        for PathPoint { endpoint, direction } in &self.path {
+            act(endpoint, direction * self.frame[0].dot(force));
+        }
+    }
+
+    /// What motions of endpoints come to: of endpoint 0 against endpoint 1, or of a path along the normal.
+    pub fn relative(&self, motion: impl Fn(&Endpoint) -> Vec3) -> Vec3 {
+        if self.path.is_empty() {
+            return motion(&self.endpoints[0]) - motion(&self.endpoints[1]);
+        }
+        let along = |sum: f64, point: &PathPoint| sum + point.direction.dot(&motion(&point.endpoint));
+        self.frame[0] * self.path.iter().fold(0.0, along)
     }
 
     /// Starts from what the last step has left of this constraint.

@@ -43,7 +43,7 @@ mod drag;
 
 pub(crate) use box_tree::BoxTree;
 pub(crate) use candidates::Candidates;
-pub(crate) use constraint::{Constraint, Endpoint, Law};
+pub(crate) use constraint::{Constraint, Endpoint, Law, PathPoint};
 pub(crate) use detection::{Detector, STATIC_MARGIN};
 pub use drag::DeformableDrag;
 pub(crate) use nearest_facet::{NearestFacet, nearest_weights};

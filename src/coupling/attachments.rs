@@ -173,7 +173,7 @@ impl AttachedVertex {
             let key = self.key(AttachmentDirection::Axis(axis as u32));
             let gap = self.x[axis] - self.point[axis];
             let mut constraint = Constraint::new(self.endpoints, Vec3::ith(axis, 1.0), gap, key);
-            constraint.law = Law::Bilateral { limit: f64::INFINITY };
+            constraint.law = Law::BILATERAL;
             constraint.compliance = compliance;
             constraints.push(constraint);
         }
@@ -194,7 +194,7 @@ impl AttachedVertex {
             for (axis, number) in [(constraint.frame[1], 0), (constraint.frame[2], 1)] {
                 let key = self.key(AttachmentDirection::Across(number));
                 let mut aside = Constraint::new(self.endpoints, axis, 0.0, key);
-                aside.law = Law::Bilateral { limit: f64::INFINITY };
+                aside.law = Law::BILATERAL;
                 aside.compliance = distance / tension;
                 constraints.push(aside);
             }

@@ -299,7 +299,7 @@ pub(crate) fn pose_of(collider: &Collider, context: &StepContext<'_>) -> Pose {
 fn shown(constraint: &Constraint, place: usize, sign: f64, point: Vec3) -> DeformableSolverContact {
     let friction = match constraint.law {
         Law::Contact { friction } => friction,
-        Law::Bilateral { .. } => 0.0,
+        Law::Bounded { .. } => 0.0,
     };
     DeformableSolverContact {
         point: to_real(&point),

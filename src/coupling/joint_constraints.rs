@@ -95,7 +95,7 @@ pub(super) fn joint_constraints(
         };
         if joint.locked_axes.intersects(bit) {
             let mut constraint = coordinate.constraint(coordinate.value, JointRole::Lock);
-            constraint.law = Law::Bilateral { limit: f64::INFINITY };
+            constraint.law = Law::BILATERAL;
             constraints.push(constraint);
             continue;
         }
@@ -172,7 +172,7 @@ fn motor_constraint(
     let mut constraint = coordinate.constraint(target / stiffness, JointRole::Motor);
     constraint.compliance = 1.0 / stiffness;
     let limit = if motor.max_force < UNLIMITED { f64::from(motor.max_force) } else { f64::INFINITY };
-    constraint.law = Law::Bilateral { limit };
+    constraint.law = Law::bilateral(limit);
     constraints.push(constraint);
 }
 

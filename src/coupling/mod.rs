@@ -23,6 +23,7 @@ mod rigid_contacts;
 mod speculative;
 
 mod attachments;
+mod cables;
 
 mod reactions;
 
@@ -30,6 +31,7 @@ mod reactions;
 mod tests;
 
 pub(crate) use attachments::{SteppedBodies, attached_nodes, attachment_constraints, prescribed_nodes};
+pub(crate) use cables::{cable_constraints, note_cable_force};
 pub(crate) use coefficients::{combine_in_place, combine_in_place_between, combined, combined_between};
 pub use hooks::{
     DeformableContactModificationContext, DeformableHooks, DeformablePairFilterContext,

@@ -243,7 +243,7 @@ proptest! {
             let constraints = constraints_of(joint, poses, &proxies);
             // Locks by kind, and the limits: a rope has an upper one only.
             prop_assert_eq!(constraints.len(), [6, 7, 7, 3, 1][kind]);
-            for constraint in constraints.iter().filter(|constraint| matches!(constraint.law, Law::Bilateral { .. })) {
+            for constraint in constraints.iter().filter(|constraint| matches!(constraint.law, Law::Bounded { .. })) {
                 // Some tens of roundings of lengths of 2 m and turns.
                 prop_assert!(constraint.gap.abs() < 1e-14, "kind {kind}: {constraint:?}");
             }

@@ -22,6 +22,8 @@ pub struct DeformableDebugRenderStyle {
     pub force_color: DebugColor,
     /// Lines of attachments.
     pub attachment_color: DebugColor,
+    /// Lines of cables.
+    pub cable_color: DebugColor,
     /// Length of an arrow per force [m/N].
     pub force_scale: f32,
     /// Half of the length of a cross \[m\].
@@ -39,6 +41,7 @@ impl Default for DeformableDebugRenderStyle {
             pin_color: [0.0, 1.0, 0.5, 1.0],
             force_color: [60.0, 1.0, 0.4, 1.0],
             attachment_color: [120.0, 1.0, 0.35, 1.0],
+            cable_color: [30.0, 1.0, 0.45, 1.0],
             force_scale: 1.0e-3,
             cross_length: 0.02,
             rapier: DebugRenderStyle::default(),
@@ -116,6 +119,7 @@ impl DeformableDebugRenderPipeline {
                     self.style.draw_arrow(pen, point, force);
                 });
                 self.style.draw_attachments(pen, world, handle);
+                self.style.draw_cables(pen, world, handle);
             }
         }
     }
@@ -155,6 +159,15 @@ impl DeformableDebugRenderStyle {
         let side = along.any_orthonormal_vector();
         for barb in [side, -side] {
             pen.line(to, to + (barb * 0.5 - along) * (0.2 * way.length()), self.force_color);
+        }
+    }
+
+    /// Those whose first deformable body it is, where they were at the start of the last step.
+    fn draw_cables(&self, pen: &mut Pen<'_>, world: &DeformableWorld, handle: DeformableBodyHandle) {
+        for (_, cable) in world.bodies.cables().filter(|(_, cable)| cable.bodies().next() == Some(handle)) {
+            for ends in cable.points.windows(2) {
+                pen.line(to_real(&ends[0]), to_real(&ends[1]), self.cable_color);
+            }
         }
     }
 

@@ -1,5 +1,6 @@
 //! What users name of a step: the world, the pipeline, its parameters, counters and contacts; and the step itself.
 
+mod cables;
 mod contacts;
 mod events;
 mod parameters;

@@ -58,7 +58,7 @@ fn complementary(end: End, numbers: &mut Numbers) -> (Law, Vec<f64>, Vec<f64>) {
     let (force, gap) = (numbers.between(1.0, 10.0), numbers.between(0.5, 5.0));
     let sign = if numbers.below(2) == 0 { 1.0 } else { -1.0 };
     let (sin, cos) = numbers.between(0.0, std::f64::consts::TAU).sin_cos();
-    let (contact, free) = (Law::Contact { friction }, Law::Bilateral { limit: f64::INFINITY });
+    let (contact, free) = (Law::Contact { friction }, Law::BILATERAL);
     match end {
         End::Open => (contact, vec![0.0; 3], vec![gap, 0.3 * gap * cos, 0.3 * gap * sin]),
         End::Closed => (Law::Contact { friction: 0.0 }, vec![force], vec![0.0]),
@@ -71,8 +71,8 @@ fn complementary(end: End, numbers: &mut Numbers) -> (Law, Vec<f64>, Vec<f64>) {
             (contact, vec![force, rubs * cos, rubs * sin], vec![friction * gap, -gap * cos, -gap * sin])
         }
         End::Bilateral if sign > 0.0 => (free, vec![force], vec![0.0]),
-        End::Bilateral => (Law::Bilateral { limit: 1.2 * force }, vec![-force], vec![0.0]),
-        End::AtLimit => (Law::Bilateral { limit: force }, vec![sign * force], vec![-sign * gap]),
+        End::Bilateral => (Law::bilateral(1.2 * force), vec![-force], vec![0.0]),
+        End::AtLimit => (Law::bilateral(force), vec![sign * force], vec![-sign * gap]),
     }
 }
 

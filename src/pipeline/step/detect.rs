@@ -5,9 +5,10 @@ use super::quarantine::quarantine;
 use super::scratch::StepScratch;
 use super::work::BodyWork;
 use crate::body::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet};
-use crate::contact::Endpoint;
+use crate::contact::{Constraint, Endpoint};
 use crate::coupling::{
-    StepContext, SteppedBodies, WalkContext, attached_nodes, attachment_constraints, prescribed_nodes,
+    StepContext, SteppedBodies, WalkContext, attached_nodes, attachment_constraints, cable_constraints,
+    prescribed_nodes,
 };
 use crate::threads::for_each;
 use std::collections::HashMap;
@@ -138,11 +139,15 @@ impl StepScratch {
             self.linking.len() + self.works.iter().map(|w| w.constraints.len()).sum::<usize>();
     }
 
-    /// Adds the constraints of the attachments.
-    pub(super) fn attach(&mut self, deformables: &DeformableBodySet, context: &StepContext<'_>) {
-        self.works.iter_mut().for_each(|work| work.linked_nodes.clear());
+    /// Adds the constraints of attachments and cables.
+    pub(super) fn attach(&mut self, deformables: &mut DeformableBodySet, context: &StepContext<'_>) {
+        for work in &mut self.works {
+            work.linked_nodes.clear();
+            work.has_cables = false;
+        }
         let stepped = Stepped { works: &self.works, places: &self.places };
         attachment_constraints(deformables, &mut self.scene, context, &stepped, &mut self.linking);
+        cable_constraints(deformables, &mut self.scene, context, &stepped, &mut self.linking);
         // Between nodes that are prescribed and what does not yield there is nothing to solve for.
         let (works, proxies) = (&self.works, &self.scene.proxies);
         self.linking.retain(|constraint| {
@@ -150,7 +155,7 @@ impl StepScratch {
                 Endpoint::Soft { body, .. } => works[*body].is_fully_pinned(endpoint),
                 Endpoint::Rigid { proxy, .. } | Endpoint::Rotation { proxy } => !proxies.yields(*proxy),
             };
-            !constraint.endpoints.iter().all(stays)
+            !constraint.all_endpoints().all(stays)
         });
         for endpoint in self.linking.iter().flat_map(|constraint| &constraint.endpoints) {
             if let Endpoint::Soft { body, .. } = endpoint {
@@ -158,12 +163,17 @@ impl StepScratch {
                 self.works[*body].linked_nodes.extend(nodes);
             }
         }
+        for point in self.linking.iter().flat_map(|constraint| &constraint.path) {
+            if let Endpoint::Soft { body, .. } = point.endpoint {
+                self.works[body].has_cables = true;
+            }
+        }
     }
 
     /// Finds what else holds the rigid bodies that deformable ones touch, through at most `limit` of them.
     pub(super) fn walk_neighbourhood(&mut self, context: &StepContext<'_>, limit: usize) {
         let constraints = self.works.iter().flat_map(|work| &work.constraints).chain(&self.linking);
-        let endpoints = constraints.flat_map(|constraint| &constraint.endpoints);
+        let endpoints = constraints.flat_map(Constraint::all_endpoints);
         let touched = endpoints.filter_map(|endpoint| endpoint.proxy());
         let (scene, candidates) = (&mut self.scene, &self.candidates);
         let mut around = WalkContext { scene, candidates, context: *context, limit };

@@ -52,7 +52,7 @@ impl StepScratch {
         let mut places = vec![None; count];
         self.works.iter().enumerate().for_each(|(place, work)| places[work.index] = Some(place));
         self.linking.retain_mut(|constraint| {
-            constraint.endpoints.iter_mut().all(|endpoint| match endpoint {
+            constraint.all_endpoints_mut().all(|endpoint| match endpoint {
                 Endpoint::Soft { body, .. } => places[*body].map(|place| *body = place).is_some(),
                 Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => true,
             })

@@ -1,7 +1,9 @@
 //! The end of a step: the bodies store what was solved, and those that have been still fall asleep.
 
 use super::quarantine::quarantine;
-use super::readout::{add_attachment_forces, list_contacts, list_pair_contacts, list_rigid_forces};
+use super::readout::{
+    add_attachment_forces, add_cable_forces, list_contacts, list_pair_contacts, list_rigid_forces,
+};
 use super::scratch::StepScratch;
 use super::sleeping::LookAround;
 use super::work::IslandWork;
@@ -44,6 +46,7 @@ impl StepScratch {
                 list_contacts(work, handle_of, &mut self.contacts);
                 list_pair_contacts(work, handle_of, &mut self.pair_contacts);
                 add_attachment_forces(work, deformables);
+                add_cable_forces(work, deformables);
                 list_rigid_forces(work, &mut self.rigid_contacts, &mut self.joint_forces);
             }
             for (problem, &index) in work.island.bodies.drain(..).zip(&work.members) {

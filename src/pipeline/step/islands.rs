@@ -60,9 +60,8 @@ impl Grouping {
         self.parent.extend(0..works.len() + proxies.list.len());
         for constraint in works.iter().flat_map(|work| &work.constraints).chain(links) {
             let mut ends = self.ends(constraint, proxies);
-            if let (Some(a), Some(b)) = (ends.next(), ends.next()) {
-                self.unite(a, b);
-            }
+            let Some(first) = ends.next() else { continue };
+            ends.for_each(|end| self.unite(first, end));
         }
     }
 
@@ -73,7 +72,7 @@ impl Grouping {
         proxies: &'a RigidProxies,
     ) -> impl Iterator<Item = usize> + use<'a> {
         let first = self.bodies;
-        constraint.endpoints.iter().filter_map(move |endpoint| match endpoint {
+        constraint.all_endpoints().filter_map(move |endpoint| match endpoint {
             Endpoint::Soft { body, .. } => Some(*body),
             Endpoint::Rigid { proxy, .. } | Endpoint::Rotation { proxy } => {
                 proxies.yields(*proxy).then(|| first + proxies.group(*proxy).0 as usize)

@@ -2,11 +2,11 @@
 
 use super::work::IslandWork;
 use crate::body::{
-    ConstraintKey, DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet, DeformableContact,
-    DeformablePairContact, JointRole,
+    CableRow, ConstraintKey, DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet,
+    DeformableCableHandle, DeformableContact, DeformablePairContact, JointRole,
 };
 use crate::contact::Endpoint;
-use crate::coupling::{body_handle, collider_handle, impulse_joint_handle};
+use crate::coupling::{body_handle, collider_handle, impulse_joint_handle, note_cable_force};
 use crate::math::{Vec3, to_real};
 use crate::pipeline::{JointForce, RigidContact, SolvedJoint};
 use crate::solver::ContactResult;
@@ -18,6 +18,16 @@ pub(super) fn add_attachment_forces(work: &IslandWork, deformables: &mut Deforma
         let handle = DeformableAttachmentHandle(axis.attachment);
         if let Some(attachment) = deformables.attachment_mut(handle) {
             attachment.force += force;
+        }
+    }
+}
+
+/// Gives cables the forces of their constraints.
+pub(super) fn add_cable_forces(work: &IslandWork, deformables: &mut DeformableBodySet) {
+    for ContactResult { constraint, force, .. } in work.island.contacts.results() {
+        let ConstraintKey::Cable(CableRow { cable, part }) = constraint.key else { continue };
+        if let Some(cable) = deformables.cable_mut(DeformableCableHandle(cable)) {
+            note_cable_force(cable, part, force.dot(&constraint.frame[0]));
         }
     }
 }
@@ -39,9 +49,8 @@ pub(super) fn list_rigid_forces(
                 contacts.push(RigidContact { collider1, collider2, point, normal, force: to_real(&force) });
                 continue;
             }
-            ConstraintKey::Obstacle(_) | ConstraintKey::SoftPair(_) | ConstraintKey::Attachment(_) => {
-                continue;
-            }
+            ConstraintKey::Obstacle(_) | ConstraintKey::SoftPair(_) => continue,
+            ConstraintKey::Attachment(_) | ConstraintKey::Cable(_) => continue,
         };
         let along = force.dot(&constraint.frame[0]);
         // Upper limits are constraints along the reversed axis.

@@ -28,8 +28,12 @@ pub(super) struct Sleeping {
 }
 
 impl Sleeping {
-    /// Wakes bodies whose attachments were changed, or are to a rigid body that is awake.
+    /// Wakes bodies whose attachments or cables were changed, or are to a rigid body that is awake.
     fn wake_attached(&mut self, deformables: &mut DeformableBodySet, sets: RapierSets<'_>) {
+        let moves = |body: &RigidBody| {
+            let led = body.is_kinematic() && body.next_position() != body.position();
+            led || body.is_moving() && !body.is_sleeping()
+        };
         self.wake.clear();
         for attachment in deformables.attachments_mut() {
             self.wake.extend(attachment.take_changed().into_iter().flatten());
@@ -39,12 +43,16 @@ impl Sleeping {
             let rigid = attachment.rigid().and_then(|handle| sets.bodies.get(handle));
             // Moved by its user, or gone.
             let moved = attachment.notice(rigid.map(|body| Pose64::from_real(body.position())));
-            let moves = |body: &RigidBody| {
-                let led = body.is_kinematic() && body.next_position() != body.position();
-                led || body.is_moving() && !body.is_sleeping()
-            };
             if moved || rigid.is_some_and(moves) {
                 self.wake.push(attachment.body());
+            }
+        }
+        for (_, cable) in deformables.cables_mut() {
+            let pose = |handle| Some(Pose64::from_real(sets.bodies.get(handle)?.position()));
+            let changed = cable.take_changed(pose);
+            let mut rigid = cable.rigid_bodies().filter_map(|handle| sets.bodies.get(handle));
+            if changed || rigid.any(moves) {
+                self.wake.extend(cable.bodies());
             }
         }
         self.wake_listed(deformables);
@@ -60,6 +68,12 @@ impl Sleeping {
                 let (Some(a), Some(b)) = (deformables.get(one), deformables.get(other)) else { continue };
                 if a.is_enabled() && b.is_enabled() && a.is_sleeping() != b.is_sleeping() {
                     self.wake.push(if a.is_sleeping() { one } else { other });
+                }
+            }
+            for (_, cable) in deformables.cables() {
+                let sleeps = |body| deformables.get(body).is_some_and(|b| b.is_enabled() && b.is_sleeping());
+                if !cable.bodies().all(sleeps) {
+                    self.wake.extend(cable.bodies().filter(|body| sleeps(*body)));
                 }
             }
             for (handle, body) in deformables.iter() {

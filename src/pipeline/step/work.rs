@@ -34,6 +34,8 @@ pub(super) struct BodyWork {
     distances: Vec<(f32, u32)>,
     /// Nodes that attachments and contacts with other deformables act on.
     pub linked_nodes: Vec<u32>,
+    /// Cables run through the body.
+    pub has_cables: bool,
     /// Nodes that attachments hold fast to a rigid body, by that body's proxy, ascending: they do not collide with it.
     pub attached: Vec<(ProxyId, u32)>,
     /// Nodes that attachments prescribe.
@@ -64,6 +66,7 @@ impl BodyWork {
             ahead: Vec::new(),
             distances: Vec::new(),
             linked_nodes: Vec::new(),
+            has_cables: false,
             attached: Vec::new(),
             prescribed: Vec::new(),
             extent: Aabb::new_invalid(),
@@ -276,7 +279,8 @@ impl BodyWork {
 
     /// Whether anything may touch the body in this step, or holds it.
     pub fn is_touched(&self) -> bool {
-        !(self.constraints.is_empty() && self.linked_nodes.is_empty() && self.prescribed.is_empty())
+        self.has_cables
+            || !(self.constraints.is_empty() && self.linked_nodes.is_empty() && self.prescribed.is_empty())
     }
 
     /// Tells where the body's factor is kept in this step.
@@ -328,7 +332,7 @@ impl IslandWork {
     /// Adds a constraint between members or proxies of the island: of what holds the latter, of
     /// attachments, of contacts between deformables.
     pub fn add_shared(&mut self, mut constraint: Constraint) {
-        for endpoint in &mut constraint.endpoints {
+        for endpoint in constraint.all_endpoints_mut() {
             if let Endpoint::Soft { body, .. } = endpoint {
                 // Members are in ascending order.
                 let Ok(local) = self.members.binary_search(body) else { return };

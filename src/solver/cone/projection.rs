@@ -1,6 +1,6 @@
 //! The Coulomb friction cone `‖λ_t‖ ≤ μ λ_n`: projection of a force onto it, and its derivative.
 //!
-//! Bilateral constraints take part as intervals: a line without a limit, a segment with one.
+//! Bounded forces take part as intervals: a line, a ray, a segment, or a point.
 //!
 //! All of it is for a weight that is the same in every direction of one contact, `R` [m/N]: then
 //! the projection of u = −ĝ/R is closed [De Saxcé & Feng 1998; Castro et al. 2022].
@@ -30,9 +30,9 @@ pub(crate) struct Projected {
 pub(crate) fn project(u: [f64; 3], law: Law) -> Projected {
     let mu = match law {
         Law::Contact { friction } => friction,
-        Law::Bilateral { limit } => {
-            let state = if u[0].abs() < limit { ConeState::Stick } else { ConeState::Open };
-            return Projected { force: [u[0].clamp(-limit, limit), 0.0, 0.0], state };
+        Law::Bounded { least, most } => {
+            let state = if least < u[0] && u[0] < most { ConeState::Stick } else { ConeState::Open };
+            return Projected { force: [u[0].clamp(least, most), 0.0, 0.0], state };
         }
     };
     if mu == 0.0 {
@@ -58,7 +58,7 @@ pub(crate) fn curvature_columns(u: [f64; 3], law: Law, R: f64, columns: &mut [[f
     let projected = project(u, law);
     let mu = match law {
         Law::Contact { friction } => friction,
-        Law::Bilateral { .. } => 0.0,
+        Law::Bounded { .. } => 0.0,
     };
     let root = (1.0 / R).sqrt();
     match projected.state {
@@ -79,11 +79,12 @@ pub(crate) fn curvature_columns(u: [f64; 3], law: Law, R: f64, columns: &mut [[f
     }
 }
 
-/// What the projection near `u` is besides its derivative times the point: nothing on a cone, the limit
-/// of a bilateral constraint that is at its limit.
+/// What the projection near `u` is besides its derivative times the point: nothing on a cone, the bound
+/// of a bounded constraint that is at it.
 pub(crate) fn constant_part(u: [f64; 3], law: Law) -> f64 {
     match law {
-        Law::Bilateral { limit } if u[0].abs() >= limit => limit.copysign(u[0]),
+        Law::Bounded { least, .. } if u[0] <= least => least,
+        Law::Bounded { most, .. } if u[0] >= most => most,
         _ => 0.0,
     }
 }

@@ -159,7 +159,7 @@ impl LocalProblem {
     fn solve(&self, force: &[f64], gap: &[f64], law: Law) -> [f64; 3] {
         let normal = force[0] - gap[0] / self.W[0][0];
         match (law, force, gap) {
-            (Law::Bilateral { limit }, ..) => [normal.clamp(-limit, limit), 0.0, 0.0],
+            (Law::Bounded { least, most }, ..) => [normal.clamp(least, most), 0.0, 0.0],
             (Law::Contact { friction }, [before, a, b], [_, slip_a, slip_b]) => {
                 let normal = normal.max(0.0);
                 let slip = [1, 2].map(|k| [slip_a, slip_b][k - 1] + self.W[k][0] * (normal - before));

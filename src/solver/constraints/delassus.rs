@@ -6,7 +6,7 @@ use super::jacobian::{EndpointJacobian, NodeMotions, Operands};
 use super::lists::{ActiveContact, MatrixPlace};
 use super::rigid_proxy::{RigidProxies, RigidProxy};
 use crate::body::ConstraintGeometry;
-use crate::contact::{Constraint, Endpoint};
+use crate::contact::{Constraint, Endpoint, PathPoint};
 use crate::math::Mat3;
 use crate::solver::body_step::{BodyProblem, Factors};
 use crate::solver::linear::BlockMatrix;
@@ -252,6 +252,7 @@ impl Ingredients {
         for ActiveContact { constraint, geometry, .. } in contacts {
             self.bits.push(constraint.compliance);
             self.bits.extend(geometry.frame[..constraint.dimension()].iter().flat_map(|d| d.iter()));
+            self.describe_path(constraint, proxies);
             for (k, endpoint) in constraint.endpoints.iter().enumerate() {
                 match endpoint {
                     Endpoint::Soft { body, .. } => {
@@ -262,16 +263,42 @@ impl Ingredients {
                     Endpoint::Rigid { proxy, .. } | Endpoint::Rotation { proxy } => {
                         self.nodes.push(proxy.0);
                         self.bits.extend(geometry.arms[k].iter());
-                        match proxies.get(*proxy) {
-                            RigidProxy::Rigid { inv_mass, steady_inv_inertia, .. } => {
-                                self.bits.extend(inv_mass.iter().chain(steady_inv_inertia));
-                            }
-                            RigidProxy::Link { articulation, slot, .. } => {
-                                self.nodes.extend([*articulation as u32, *slot as u32]);
-                            }
-                            RigidProxy::Prescribed { .. } => {}
-                        }
+                        self.describe_proxy(proxies.get(*proxy));
                     }
+                }
+            }
+        }
+    }
+
+    fn describe_proxy(&mut self, proxy: &RigidProxy) {
+        match proxy {
+            RigidProxy::Rigid { inv_mass, steady_inv_inertia, .. } => {
+                self.bits.extend(inv_mass.iter().chain(steady_inv_inertia));
+            }
+            RigidProxy::Link { articulation, slot, .. } => {
+                self.nodes.extend([*articulation as u32, *slot as u32]);
+            }
+            RigidProxy::Prescribed { .. } => {}
+        }
+    }
+
+    fn describe_path(&mut self, constraint: &Constraint, proxies: &RigidProxies) {
+        for PathPoint { endpoint, direction } in &constraint.path {
+            self.bits.extend(direction.iter());
+            match endpoint {
+                Endpoint::Soft { body, nodes, weights } => {
+                    self.nodes.push(*body as u32);
+                    self.nodes.extend(nodes);
+                    self.bits.extend(weights);
+                }
+                Endpoint::Rigid { proxy, point } => {
+                    self.nodes.push(proxy.0);
+                    self.bits.extend((point - proxies.get(*proxy).com()).iter());
+                    self.describe_proxy(proxies.get(*proxy));
+                }
+                Endpoint::Rotation { proxy } => {
+                    self.nodes.push(proxy.0);
+                    self.describe_proxy(proxies.get(*proxy));
                 }
             }
         }

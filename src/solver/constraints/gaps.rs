@@ -10,10 +10,12 @@ use crate::solver::body_step::BodyProblem;
 /// What to add to the motion along the normal so that zero is the target_gap.
 pub(super) fn target_gap(constraint: &Constraint, context: &SolveContext<'_>) -> f64 {
     let (h, limits) = (context.h, context.limits);
-    if let Law::Bilateral { .. } = constraint.law {
+    if let Law::Bounded { least, .. } = constraint.law {
         // What gives way is pulled back by its own force.
         let fastest = if constraint.compliance > 0.0 { f64::INFINITY } else { limits.recovery_speed * h };
-        return constraint.gap.clamp(-fastest, fastest);
+        // What does not push may be slack by any length.
+        let farthest = if least < 0.0 { fastest } else { f64::INFINITY };
+        return constraint.gap.clamp(-fastest, farthest);
     }
     let velocity = |endpoint: &Endpoint| context.proxies.velocity(endpoint, context.h);
     let approach =
@@ -68,5 +70,5 @@ pub(super) fn relative_motion<'a>(
         }
         _ => context.proxies.displacement(endpoint, reactions, context.h),
     };
-    moved(&constraint.endpoints[0]) - moved(&constraint.endpoints[1]) - constraint.surface_motion
+    constraint.relative(moved) - constraint.surface_motion
 }

@@ -83,6 +83,9 @@ impl ContactGroups {
     }
 
     fn share(&self, a: usize, b: usize) -> bool {
+        if self.ends[a] == OF_PATHS || self.ends[b] == OF_PATHS {
+            return true;
+        }
         self.ends[a].iter().flatten().any(|end| self.ends[b].contains(&Some(*end)))
     }
 
@@ -116,8 +119,14 @@ impl ContactGroups {
     }
 }
 
+/// Constraints along paths are one group, which knows of all others: they are few, and one may run through any bodies.
+const OF_PATHS: [Option<u64>; 2] = [Some(u64::MAX); 2];
+
 /// The two things that a constraint is between, as far as they yield.
 fn ends_of(constraint: &Constraint, proxies: &RigidProxies) -> [Option<u64>; 2] {
+    if !constraint.path.is_empty() {
+        return OF_PATHS;
+    }
     [&constraint.endpoints[0], &constraint.endpoints[1]].map(|endpoint| match endpoint {
         Endpoint::Soft { body, .. } => Some(*body as u64),
         Endpoint::Rigid { proxy, .. } | Endpoint::Rotation { proxy } => {

@@ -4,6 +4,7 @@
 use super::context::SolveContext;
 use super::gaps::{relative_motion, shorter_edge};
 use super::lists::ActiveContact;
+use super::paths::BOUND_ROUNDS;
 use super::system::ContactSystem;
 use super::without_matrix::PRODUCTS;
 use crate::contact::{Endpoint, Law};
@@ -69,6 +70,18 @@ impl ContactSystem {
             return false;
         }
         let around = Around { factors, context, tolerance };
+        let mut changed = false;
+        for _ in 0..BOUND_ROUNDS {
+            changed |= self.improve_within_bounds(bodies, around);
+            if !self.follow_tensions() {
+                break;
+            }
+        }
+        changed
+    }
+
+    fn improve_within_bounds(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) -> bool {
+        let Around { factors, context, tolerance } = around;
         self.measure(bodies, context);
         let is_small = bodies.len() < CROWD;
         let has_columns = bodies.iter().enumerate().all(|(i, b)| factors.has_columns(i, b));
@@ -115,7 +128,7 @@ impl ContactSystem {
     /// Whether something rigid that yields might take part: sweeps carry a load through light things slowly.
     fn has_loads(&self, context: &SolveContext<'_>) -> bool {
         let yields = |endpoint: &Endpoint| endpoint.proxy().is_some_and(|p| context.proxies.yields(p));
-        self.constraints().any(|constraint| constraint.endpoints.iter().any(yields))
+        self.constraints().any(|constraint| constraint.all_endpoints().any(yields))
     }
 
     /// Whether W would cost more than the products that go without it: where bodies are crushed into one another, each has

@@ -53,18 +53,16 @@ impl MatrixFree<'_> {
         if rows.iter().all(|v| *v == 0.0) {
             return;
         }
-        let force = constraint.force(rows);
         let Response { bodies, reactions } = &mut *self.response;
-        for (endpoint, sign) in constraint.endpoints.iter().zip([1.0, -1.0]) {
+        constraint.for_each_force(&constraint.force(rows), |endpoint, force| {
             let Endpoint::Soft { body, .. } = endpoint else {
-                self.context.proxies.add_reaction(endpoint, &(force * sign), self.context.h, reactions);
-                continue;
+                return self.context.proxies.add_reaction(endpoint, &force, self.context.h, reactions);
             };
             bodies[*body].is_touched = true;
             for (node, weight) in endpoint.soft_nodes() {
-                bodies[*body].forces[node] += force * (sign * weight);
+                bodies[*body].forces[node] += force * weight;
             }
-        }
+        });
     }
 
     fn motion(&self, endpoint: &Endpoint) -> Vec3 {
@@ -92,8 +90,7 @@ impl ConeOperator for MatrixFree<'_> {
         });
         out.clear();
         for ActiveContact { constraint, .. } in self.contacts {
-            let [a, b] = &constraint.endpoints;
-            let moved = self.motion(a) - self.motion(b);
+            let moved = constraint.relative(|endpoint| self.motion(endpoint));
             let normal = out.len();
             out.extend(constraint.directions().iter().map(|d| d.dot(&moved)));
             out[normal] += constraint.compliance * v[normal];

@@ -27,6 +27,8 @@ mod system;
 
 mod improve;
 
+mod paths;
+
 mod with_matrix;
 
 mod without_matrix;

@@ -179,8 +179,8 @@ impl ContactSystem {
         let is_rigid = |endpoint: &Endpoint| !matches!(endpoint, Endpoint::Soft { .. });
         for contact in &mut self.active {
             keep_together(&mut contact.constraint, index);
-            let endpoints = &contact.constraint.endpoints;
-            if endpoints.iter().any(|endpoint| endpoint.is_of(index)) || endpoints.iter().all(is_rigid) {
+            let mut endpoints = contact.constraint.all_endpoints();
+            if endpoints.clone().any(|endpoint| endpoint.is_of(index)) || endpoints.all(is_rigid) {
                 self.lambda[contact.rows()].fill(0.0);
                 contact.shift = 0.0;
             }
@@ -208,13 +208,13 @@ impl ContactSystem {
         }
         for contact in &self.active {
             let force = contact.force(&self.lambda);
-            for (endpoint, sign) in contact.constraint.endpoints.iter().zip([1.0, -1.0]) {
+            contact.constraint.for_each_force(&force, |endpoint, force| {
                 if let Endpoint::Soft { body, .. } = endpoint {
                     for (node, weight) in endpoint.soft_nodes() {
-                        bodies[*body].contact_force[node] += force * (sign * weight);
+                        bodies[*body].contact_force[node] += force * weight;
                     }
                 }
-            }
+            });
         }
     }
 
@@ -243,9 +243,8 @@ impl ContactSystem {
             if force == Vec3::zeros() {
                 continue;
             }
-            for (endpoint, sign) in contact.constraint.endpoints.iter().zip([1.0, -1.0]) {
-                proxies.add_reaction(endpoint, &(force * sign), h, reactions);
-            }
+            let add = |endpoint: &Endpoint, force| proxies.add_reaction(endpoint, &force, h, reactions);
+            contact.constraint.for_each_force(&force, add);
         }
     }
 }
@@ -253,10 +252,10 @@ impl ContactSystem {
 /// Within what begins anew nothing is drawn apart.
 fn keep_together(constraint: &mut Constraint, index: usize) {
     let is_own = |endpoint: &Endpoint| endpoint.is_of(index);
-    if constraint.compliance != 0.0 || !constraint.endpoints.iter().any(is_own) {
+    if constraint.compliance != 0.0 || !constraint.all_endpoints().any(is_own) {
         return;
     }
-    let is_bilateral = matches!(constraint.law, Law::Bilateral { .. });
+    let is_bilateral = matches!(constraint.law, Law::Bounded { least, .. } if least < 0.0);
     constraint.target_gap = if is_bilateral { 0.0 } else { constraint.target_gap.max(0.0) };
     // Within a rigid shape nothing moves, and W would be zero there.
     if constraint.endpoints.iter().all(is_own) {

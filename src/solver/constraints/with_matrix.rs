@@ -19,7 +19,8 @@ const SWEEPS: usize = 2;
 
 impl ContactSystem {
     /// Brings W and W λ up to date, and Newton's expectation where the problem is another one.
-    pub(super) fn assemble(&mut self, bodies: &[BodyProblem], Around { factors, context, .. }: Around<'_>) {
+    pub(super) fn assemble(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) {
+        let Around { factors, context, .. } = around;
         let change = std::mem::take(&mut self.dense.change);
         if change == Change::Nothing {
             return;
@@ -36,9 +37,10 @@ impl ContactSystem {
                 dense.problem.groups.clone_from(&self.groups.starts);
                 dense.problem.filled.clone_from(&self.groups.filled);
                 dense.problem.version += 1;
+                self.fill_path_columns(bodies, around);
             }
         }
-        dense.problem.multiply(&self.lambda, &mut dense.slips);
+        self.dense.problem.multiply(&self.lambda, &mut self.dense.slips);
         if matches!(change, Change::Contacts | Change::Forces) {
             self.predict(bodies, context);
         }

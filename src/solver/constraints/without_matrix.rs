@@ -49,12 +49,14 @@ impl ContactSystem {
         changed
     }
 
-    fn update_metric(&mut self, bodies: &[BodyProblem], Around { factors, context, .. }: Around<'_>) {
+    fn update_metric(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) {
+        let Around { factors, context, .. } = around;
         // Any metric serves; frames that turn within a step do not matter to it.
         if self.free.change >= Change::Factors {
             let parts = CoarseParts { bodies, factors, proxies: context.proxies, h: context.h };
             self.free.coarse.update(&mut self.free.metric, &self.active, parts);
             self.free.change = Change::Nothing;
+            self.measure_paths(bodies, around);
         }
     }
 
