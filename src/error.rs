@@ -50,6 +50,12 @@ pub enum BodyError {
         /// What is wrong.
         what: &'static str,
     },
+    /// What no pad of taxels, and no camera, has.
+    #[error("the sensor cannot be: {what}")]
+    BadPad {
+        /// What is wrong.
+        what: &'static str,
+    },
     /// A place that no tetrahedron of the body holds.
     #[error("{point:?} is not inside of the body")]
     NotInside {

@@ -23,6 +23,7 @@
 //! | `coupling` | rapier's sets, read into obstacles and proxies, and the reactions written back |
 //! | `pipeline` | the world, the pipeline and what can be read of a step; inside, the step as a list of verbs |
 //! | `export` | files of what has been simulated |
+//! | `touch` | taxels, markers, depth images and wrenches, read after a step |
 //!
 //! # Invariants
 //! - A module imports from modules above it in the table only, within `solver` too (`tests/architecture.rs`).
@@ -88,6 +89,8 @@ mod pipeline;
 
 mod export;
 
+mod touch;
+
 pub use body::{
     Acceleration, AttachTo, CablePoint, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
     DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableCable, DeformableCableBuilder,
@@ -118,21 +121,24 @@ pub use pipeline::{
 pub use pipeline::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};
 pub use skin::{DeformableSkin, DeformableSurfaceMesh};
 pub use solver::DeformableMode;
+pub use touch::{ContactWrench, DepthCamera, TactilePad, TactileReading};
 
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
 pub mod prelude {
     pub use crate::{
-        Acceleration, AttachTo, CablePoint, CavityFilling, DeformableAttachment, DeformableAttachmentHandle,
-        DeformableBody, DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
-        DeformableCable, DeformableCableBuilder, DeformableCableHandle, DeformableChannelEventCollector,
-        DeformableColliders, DeformableCollisionEvent, DeformableContact, DeformableContactForceEvent,
+        Acceleration, AttachTo, CablePoint, CavityFilling, ContactWrench, DeformableAttachment,
+        DeformableAttachmentHandle, DeformableBody, DeformableBodyBuilder, DeformableBodyError,
+        DeformableBodyHandle, DeformableBodySet, DeformableCable, DeformableCableBuilder,
+        DeformableCableHandle, DeformableChannelEventCollector, DeformableColliders,
+        DeformableCollisionEvent, DeformableContact, DeformableContactForceEvent,
         DeformableContactModificationContext, DeformableContactPartner, DeformableCounters, DeformableDrag,
         DeformableEventHandler, DeformableHooks, DeformableMaterial, DeformableMode, DeformableModel,
         DeformablePairContact, DeformablePairFilterContext, DeformableParameters, DeformablePipeline,
         DeformableRest, DeformableSkin, DeformableSolverContact, DeformableStress, DeformableSurfaceMesh,
-        DeformableSurfacePoint, DeformableWind, DeformableWorld, Elasticity, FactorPrecision, Fidelity,
-        Frames, Integrator, JointForce, JointRole, MaxwellBranch, PhysicsParts, RigidContact, SolvedJoint,
-        Solver, SolverSettings, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix, TetMesh,
+        DeformableSurfacePoint, DeformableWind, DeformableWorld, DepthCamera, Elasticity, FactorPrecision,
+        Fidelity, Frames, Integrator, JointForce, JointRole, MaxwellBranch, PhysicsParts, RigidContact,
+        SolvedJoint, Solver, SolverSettings, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix, TactilePad,
+        TactileReading, TetMesh,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the ground up.
-const ROOMS: [&[&str]; 13] = [
+const ROOMS: [&[&str]; 14] = [
     &["math", "profiler", "threads"],
     &["mesh"],
     &["energy"],
@@ -22,6 +22,7 @@ const ROOMS: [&[&str]; 13] = [
     &["coupling"],
     &["pipeline"],
     &["export"],
+    &["touch"],
 ];
 
 /// Within `solver`, from the ground up.

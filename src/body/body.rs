@@ -16,7 +16,7 @@ use crate::mesh::point_normals;
 use parry3d::bounding_volume::Aabb;
 use rapier3d::dynamics::{CoefficientCombineRule, RigidBodyType};
 use rapier3d::geometry::InteractionGroups;
-use rapier3d::math::{Rotation, Vector};
+use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::pipeline::{ActiveEvents, ActiveHooks};
 use std::sync::Arc;
 
@@ -270,6 +270,12 @@ impl DeformableBody {
         let sum = values.iter().zip(&self.masses).fold(Vec3::zeros(), |a, (p, m)| a + p * *m);
         sum / self.masses.iter().sum::<f64>()
     }
+}
+
+/// A pose of the user's, if it is one.
+pub(crate) fn check_pose(quantity: &'static str, pose: &Pose) -> Result<(), BodyError> {
+    finite(quantity, pose.translation)?;
+    rotation(quantity, pose.rotation)
 }
 
 /// A rotation of the user's, if it is one.

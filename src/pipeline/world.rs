@@ -6,7 +6,7 @@ use super::parameters::{DeformableCounters, DeformableParameters};
 use super::pipeline::DeformablePipeline;
 use crate::body::{
     DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableContact,
-    DeformablePairContact,
+    DeformableContactPartner, DeformablePairContact,
 };
 use crate::coupling::{DeformableColliders, DeformableHooks, PhysicsParts};
 use crate::error::DeformableBodyError;
@@ -185,6 +185,27 @@ impl DeformableWorld {
         forces.sum()
     }
 
+    /// Calls `f` with every contact of the last step that a body has: what it touched, where \[m\], the force on the body \[N\], and the
+    /// vertices that share it.
+    pub(crate) fn for_each_contact_force(
+        &self,
+        body: DeformableBodyHandle,
+        mut f: impl FnMut(DeformableContactPartner, Vector, Vector, &[usize; 3], &[f64; 3]),
+    ) {
+        for contact in self.contacts_of(body) {
+            let partner = DeformableContactPartner::Collider(contact.collider);
+            f(partner, contact.point, contact.force, &contact.vertices, &contact.weights);
+        }
+        for contact in self.pair_contacts() {
+            let ends = [contact.body1, contact.body2];
+            for side in (0..2).filter(|side| ends[*side] == body) {
+                let force = if side == 0 { contact.force } else { -contact.force };
+                let partner = DeformableContactPartner::Deformable(ends[1 - side]);
+                f(partner, contact.point, force, &contact.vertices[side], &contact.weights[side]);
+            }
+        }
+    }
+
     /// Force per area \[Pa\] of all contacts of the last step on each vertex of a body, those with deformable bodies and itself
     /// included: times [`DeformableBody::vertex_areas`] it sums to the contact forces, in the solver's precision. Zero at vertices without a
     /// surface.
@@ -197,7 +218,7 @@ impl DeformableWorld {
     ) -> Result<Vec<[f64; 3]>, DeformableBodyError> {
         let areas = self.bodies.get(body).ok_or_else(|| body.no_such_body())?.vertex_areas();
         let mut tractions = vec![[0.0; 3]; areas.len()];
-        let mut add = |vertices: &[usize; 3], weights: &[f64; 3], force: Vector| {
+        self.for_each_contact_force(body, |_, _, force, vertices, weights| {
             for (vertex, weight) in vertices.iter().zip(weights) {
                 // Contacts of a damaged snapshot may name any vertex.
                 if let Some(area) = areas.get(*vertex).filter(|area| **area > 0.0) {
@@ -206,14 +227,7 @@ impl DeformableWorld {
                     own.for_each(|(t, f)| *t += f64::from(f) * share);
                 }
             }
-        };
-        self.contacts_of(body).for_each(|c| add(&c.vertices, &c.weights, c.force));
-        for contact in self.pair_contacts() {
-            let ends = [(contact.body1, contact.force), (contact.body2, -contact.force)];
-            for (side, (_, force)) in ends.into_iter().enumerate().filter(|(_, (of, _))| *of == body) {
-                add(&contact.vertices[side], &contact.weights[side], force);
-            }
-        }
+        });
         Ok(tractions)
     }
 
