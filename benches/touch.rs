@@ -56,5 +56,8 @@ fn main() {
         markers / step,
         image / step
     );
-    assert!(taxels + markers < 0.05 * step, "reading taxels and markers takes a twentieth of a step and more");
+    assert!(
+        taxels + markers < 0.05 * step,
+        "reading taxels and markers takes a twentieth of a step and more"
+    );
 }

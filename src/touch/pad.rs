@@ -103,7 +103,7 @@ impl TactilePad {
         for triangle in body.model().surface_triangles() {
             pad.add_triangle(triangle, triangle.map(rest), half_extents.map(f64::from));
         }
-        pad.shares.sort_unstable_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)));
+        pad.shares.sort_unstable_by_key(|share| (share.0, share.1));
         for own in pad.shares.chunk_by_mut(|a, b| a.0 == b.0) {
             let sum: f64 = own.iter().map(|share| share.2).sum();
             own.iter_mut().for_each(|share| share.2 /= sum);
