@@ -152,3 +152,31 @@ pub enum DeformableBodyError {
         dt: f64,
     },
 }
+
+/// A signal that cannot be.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum ActuatorError {
+    /// No such signal.
+    #[error("there is no signal {name:?}")]
+    Unknown {
+        /// The name asked for.
+        name: String,
+    },
+    /// A name that is taken.
+    #[error("there is a signal {name:?} already")]
+    Duplicate {
+        /// The name.
+        name: String,
+    },
+    /// A number that no signal has.
+    #[error("signal {name:?}: the {what} is {value}")]
+    BadNumber {
+        /// The signal.
+        name: String,
+        /// Which number, and what is wrong with it.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}

@@ -100,11 +100,11 @@ pub use body::{
 };
 pub use contact::{DeformableDrag, DeformableSurfacePoint};
 pub use coupling::{
-    DeformableColliders, DeformableContactModificationContext, DeformableHooks, DeformablePairFilterContext,
-    DeformableSolverContact, PhysicsParts,
+    Actuator, ActuatorSignal, DeformableActuators, DeformableColliders, DeformableContactModificationContext,
+    DeformableHooks, DeformablePairFilterContext, DeformableSolverContact, JointMotorAxis, PhysicsParts,
 };
 pub use energy::{CavityFilling, Elasticity};
-pub use error::{BodyError, DeformableBodyError, HandleError};
+pub use error::{ActuatorError, BodyError, DeformableBodyError, HandleError};
 #[cfg(feature = "export")]
 pub use export::VtkSeries;
 pub use fem::{DeformableCavity, DeformableModel, SystemMatrix};
@@ -126,19 +126,19 @@ pub use touch::{ContactWrench, DepthCamera, TactilePad, TactileReading};
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
 pub mod prelude {
     pub use crate::{
-        Acceleration, AttachTo, CablePoint, CavityFilling, ContactWrench, DeformableAttachment,
-        DeformableAttachmentHandle, DeformableBody, DeformableBodyBuilder, DeformableBodyError,
-        DeformableBodyHandle, DeformableBodySet, DeformableCable, DeformableCableBuilder,
-        DeformableCableHandle, DeformableChannelEventCollector, DeformableColliders,
+        Acceleration, Actuator, ActuatorError, ActuatorSignal, AttachTo, CablePoint, CavityFilling,
+        ContactWrench, DeformableActuators, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
+        DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet, DeformableCable,
+        DeformableCableBuilder, DeformableCableHandle, DeformableChannelEventCollector, DeformableColliders,
         DeformableCollisionEvent, DeformableContact, DeformableContactForceEvent,
         DeformableContactModificationContext, DeformableContactPartner, DeformableCounters, DeformableDrag,
         DeformableEventHandler, DeformableHooks, DeformableMaterial, DeformableMode, DeformableModel,
         DeformablePairContact, DeformablePairFilterContext, DeformableParameters, DeformablePipeline,
         DeformableRest, DeformableSkin, DeformableSolverContact, DeformableStress, DeformableSurfaceMesh,
         DeformableSurfacePoint, DeformableWind, DeformableWorld, DepthCamera, Elasticity, FactorPrecision,
-        Fidelity, Frames, Integrator, JointForce, JointRole, MaxwellBranch, PhysicsParts, RigidContact,
-        SolvedJoint, Solver, SolverSettings, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix, TactilePad,
-        TactileReading, TetMesh,
+        Fidelity, Frames, Integrator, JointForce, JointMotorAxis, JointRole, MaxwellBranch, PhysicsParts,
+        RigidContact, SolvedJoint, Solver, SolverSettings, Structure, SurfaceMesh, SurfaceRepair,
+        SystemMatrix, TactilePad, TactileReading, TetMesh,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

@@ -24,15 +24,15 @@ promises! {
     is_thread_safe: DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody,
         DeformableBodyBuilder, DeformableModel, DeformableState, DeformableMaterial, DeformableParameters,
         DeformableCounters, TetMesh, Structure, SolverSettings, Solver, SystemMatrix, Frames, Integrator,
-        Acceleration, FactorPrecision, Fidelity, Elasticity, CavityFilling, CablePoint, ContactWrench, DepthCamera, TactilePad, TactileReading, DeformableCable, DeformableCableBuilder, DeformableCableHandle, foible3d::DeformableCavity, DeformableBodyHandle, DeformableAttachment,
+        Acceleration, FactorPrecision, Fidelity, Elasticity, CavityFilling, Actuator, ActuatorSignal, DeformableActuators, JointMotorAxis, foible3d::ActuatorError, CablePoint, ContactWrench, DepthCamera, TactilePad, TactileReading, DeformableCable, DeformableCableBuilder, DeformableCableHandle, foible3d::DeformableCavity, DeformableBodyHandle, DeformableAttachment,
         DeformableAttachmentHandle, AttachTo, DeformableContact, DeformablePairContact, RigidContact, JointForce,
         JointRole, SolvedJoint, DeformableSurfacePoint, DeformableBodyError, BodyError, HandleError, MaterialError,
         MeshError, DeformableContactPartner, DeformableWind, DeformableRest, DeformableMode, MaxwellBranch, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceFault, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableDrag, DeformableCollisionEvent,
         DeformableContactForceEvent, DeformableChannelEventCollector, DeformableSolverContact,
         DeformablePairFilterContext<'static>, DeformableContactModificationContext<'static>;
     is_printed: DeformableDrag, DeformableColliders, DeformableSkin, DeformableSurfaceMesh, DeformableChannelEventCollector, DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody,
-        DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh, Structure, DeformableAttachment, DeformableCable, DeformableCableBuilder, DepthCamera, TactilePad, TactileReading;
-    is_cloned: DepthCamera, TactilePad, TactileReading, DeformableSkin, DeformableSurfaceMesh, DeformableWorld, DeformableBodySet, DeformableBody, DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh,
+        DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh, Structure, DeformableAttachment, DeformableCable, DeformableCableBuilder, DeformableActuators, foible3d::ActuatorError, DepthCamera, TactilePad, TactileReading;
+    is_cloned: DeformableActuators, foible3d::ActuatorError, DepthCamera, TactilePad, TactileReading, DeformableSkin, DeformableSurfaceMesh, DeformableWorld, DeformableBodySet, DeformableBody, DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh,
         Structure, DeformableAttachment, DeformableCable, DeformableCableBuilder, AttachTo, DeformableBodyError, MeshError;
 }
 
@@ -41,7 +41,7 @@ const fn is_copied<T: Copy + PartialEq + Debug>() {}
 
 promises! {
     is_copied: DeformableMaterial, DeformableParameters, DeformableCounters, SolverSettings, Solver, SystemMatrix,
-        Frames, Integrator, Acceleration, FactorPrecision, Fidelity, Elasticity, CavityFilling, CablePoint, ContactWrench, DeformableCableHandle, foible3d::DeformableCavity, DeformableBodyHandle,
+        Frames, Integrator, Acceleration, FactorPrecision, Fidelity, Elasticity, CavityFilling, Actuator, ActuatorSignal, JointMotorAxis, CablePoint, ContactWrench, DeformableCableHandle, foible3d::DeformableCavity, DeformableBodyHandle,
         DeformableAttachmentHandle, DeformableContact, DeformablePairContact, RigidContact, JointForce, JointRole,
         SolvedJoint, DeformableSurfacePoint, BodyError, HandleError, MaterialError, DeformableContactPartner, DeformableWind, DeformableRest,
         DeformableCollisionEvent, DeformableContactForceEvent, DeformableSolverContact;

@@ -22,6 +22,7 @@ mod neighbourhood;
 mod rigid_contacts;
 mod speculative;
 
+mod actuators;
 mod attachments;
 mod cables;
 
@@ -30,6 +31,7 @@ mod reactions;
 #[cfg(test)]
 mod tests;
 
+pub use actuators::{Actuator, ActuatorSignal, DeformableActuators, JointMotorAxis};
 pub(crate) use attachments::{SteppedBodies, attached_nodes, attachment_constraints, prescribed_nodes};
 pub(crate) use cables::{cable_constraints, note_cable_force};
 pub(crate) use coefficients::{combine_in_place, combine_in_place_between, combined, combined_between};

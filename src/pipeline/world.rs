@@ -8,7 +8,7 @@ use crate::body::{
     DeformableBody, DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableContact,
     DeformableContactPartner, DeformablePairContact,
 };
-use crate::coupling::{DeformableColliders, DeformableHooks, PhysicsParts};
+use crate::coupling::{DeformableActuators, DeformableColliders, DeformableHooks, PhysicsParts};
 use crate::error::DeformableBodyError;
 use rapier3d::geometry::ColliderHandle;
 use rapier3d::math::Vector;
@@ -42,6 +42,8 @@ pub struct DeformableWorld {
     /// Colliders with which rapier's queries, character controllers and vehicles see the bodies; none unless asked for, as
     /// they are refitted in every step.
     pub query_colliders: Option<DeformableColliders>,
+    /// What drives the scene, by name.
+    pub actuators: DeformableActuators,
     /// Memory and caches of the step.
     #[cfg_attr(feature = "serde-serialize", serde(skip))]
     pub pipeline: DeformablePipeline,
@@ -54,6 +56,7 @@ impl Clone for DeformableWorld {
             bodies: self.bodies.clone(),
             parameters: self.parameters,
             query_colliders: self.query_colliders.clone(),
+            actuators: self.actuators.clone(),
             pipeline: DeformablePipeline::new(),
         }
     }
@@ -107,6 +110,7 @@ impl DeformableWorld {
         events: &dyn DeformableEventHandler,
     ) {
         let mut parts = PhysicsParts::from(&mut *physics);
+        self.actuators.apply(&mut self.bodies, &mut parts);
         self.pipeline.before_step_with_hooks(&self.parameters, &mut self.bodies, &mut parts, hooks);
         self.pipeline.send_events(&self.bodies, &physics.colliders, events);
         if let Some(colliders) = &mut self.query_colliders {
