@@ -27,6 +27,7 @@ impl Rapier {
         PhysicsParts {
             gravity: GRAVITY,
             dt: self.parameters.dt,
+            substeps: self.parameters.num_solver_iterations,
             bodies: &mut self.bodies,
             colliders: &self.colliders,
             narrow_phase: &self.narrow_phase,

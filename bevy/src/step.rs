@@ -128,6 +128,7 @@ fn with_parts<R>(
     let parts = PhysicsParts {
         gravity: configuration.gravity,
         dt,
+        substeps: simulation.integration_parameters.num_solver_iterations,
         bodies: &mut bodies.bodies,
         colliders: &colliders.colliders,
         narrow_phase: &simulation.narrow_phase,

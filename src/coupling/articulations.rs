@@ -1,14 +1,15 @@
 //! Multibodies as articulations: links that yield together by the inverse of their mass matrix.
 //!
 //! Rapier moves a link by its generalized velocities only: what we do to links is handed over as
-//! `v += M⁻¹ Σ Jᵀp`; an impulse on the link's body would be lost.
+//! `v += M⁻¹ Σ Jᵀp`; an impulse on the link's body would be lost. Damping and springs of joints are in `passive_joints`.
 
 use super::mass_properties::{current_mass_properties, external_force};
 use super::parts::{PhysicsParts, RapierSets, StepContext};
+use super::passive_joints::PassiveJoints;
 use crate::contact::ProxyId;
 use crate::math::{Vec3, from_real};
 use crate::solver::{Articulation, Reaction, RigidProxy, Twist};
-use nalgebra::{DMatrix, Matrix6, Vector6};
+use nalgebra::{DMatrix, DVector, Dyn, Matrix6, OMatrix, U6, Vector6};
 use rapier3d::dynamics::{Multibody, MultibodyIndex, RigidBodyHandle};
 use rapier3d::math::Vector;
 
@@ -48,10 +49,12 @@ pub(super) fn read_articulation(
     if links.is_empty() || jacobians.clone().any(|J| J.ncols() != dofs) {
         return None;
     }
-    let blocks = compliances(multibody, &links);
+    let passive = PassiveJoints::of(multibody, context.h, context.substeps);
+    let blocks = compliances(multibody, &links, passive.as_ref());
     let count = links.len();
     let gravity = context.gravity_f32();
     let forces: Vec<Vector6<f64>> = links.iter().map(|(_, h)| external_wrench(sets, *h, gravity)).collect();
+    let free = passive.and_then(|passive| free_velocity(multibody, &links, &forces, context.h, &passive));
     let mut proxies = Vec::with_capacity(count);
     for (slot, &(_, handle)) in links.iter().enumerate() {
         let body = sets.bodies.get(handle)?;
@@ -60,10 +63,14 @@ pub(super) fn read_articulation(
             gain += blocks[slot * count + other] * force * context.h;
         }
         let twist = Twist { linear: from_real(body.linvel()), angular: from_real(body.angvel()) };
-        let free = Twist {
-            linear: twist.linear + gain.fixed_rows::<3>(0),
-            angular: twist.angular + gain.fixed_rows::<3>(3),
+        let all: Vector6<f64> = match &free {
+            Some(free) => wide(multibody, links[slot].0) * free,
+            None => {
+                let [l, a] = [twist.linear, twist.angular];
+                Vector6::new(l.x, l.y, l.z, a.x, a.y, a.z) + gain
+            }
         };
+        let free = Twist { linear: all.fixed_rows::<3>(0).into(), angular: all.fixed_rows::<3>(3).into() };
         let com = from_real(current_mass_properties(sets.colliders, body).world_com);
         proxies.push(RigidProxy::Link { articulation: number, slot, com, twist, free });
     }
@@ -71,18 +78,26 @@ pub(super) fn read_articulation(
 }
 
 /// `J_a M⁻¹ J_bᵀ` of all pairs of links, made symmetric: rapier's matrices are in single precision.
-fn compliances(multibody: &Multibody, links: &[(usize, RigidBodyHandle)]) -> Vec<Matrix6<f64>> {
+fn compliances(
+    multibody: &Multibody,
+    links: &[(usize, RigidBodyHandle)],
+    passive: Option<&PassiveJoints>,
+) -> Vec<Matrix6<f64>> {
     let count = links.len();
     let J = |slot: usize| multibody.body_jacobian(links[slot].0);
-    let moved: Vec<Option<DMatrix<f32>>> = (0..count)
+    let moved: Vec<Option<DMatrix<f64>>> = (0..count)
         .map(|b| {
-            multibody.inv_augmented_mass().solve(&DMatrix::from_fn(J(b).ncols(), 6, |i, j| J(b)[(j, i)]))
+            let transposed = DMatrix::from_fn(J(b).ncols(), 6, |i, j| J(b)[(j, i)]);
+            match passive {
+                Some(passive) => passive.mean_responses(&transposed.map(f64::from)),
+                None => Some(multibody.inv_augmented_mass().solve(&transposed)?.map(f64::from)),
+            }
         })
         .collect();
     let block = |a: usize, b: usize| {
         let Some(moved) = &moved[b] else { return Matrix6::zeros() };
-        let product = J(a) * moved;
-        Matrix6::from_fn(|r, c| f64::from(product[(r, c)]))
+        let product = wide(multibody, links[a].0) * moved;
+        Matrix6::from_fn(|r, c| product[(r, c)])
     };
     let mut blocks = Vec::with_capacity(count * count);
     for a in 0..count {
@@ -91,6 +106,27 @@ fn compliances(multibody: &Multibody, links: &[(usize, RigidBodyHandle)]) -> Vec
         }
     }
     blocks
+}
+
+/// The Jacobian of a link in double precision.
+fn wide(multibody: &Multibody, link: usize) -> OMatrix<f64, U6, Dyn> {
+    let J = multibody.body_jacobian(link);
+    OMatrix::<f64, U6, Dyn>::from_fn(J.ncols(), |i, j| f64::from(J[(i, j)]))
+}
+
+/// Mean of the generalized velocities over a step under external forces, damping and springs.
+fn free_velocity(
+    multibody: &Multibody,
+    links: &[(usize, RigidBodyHandle)],
+    forces: &[Vector6<f64>],
+    h: f64,
+    passive: &PassiveJoints,
+) -> Option<DVector<f64>> {
+    let mut impulse = DVector::zeros(multibody.ndofs());
+    for ((link, _), force) in links.iter().zip(forces) {
+        impulse += wide(multibody, *link).tr_mul(force) * h;
+    }
+    passive.free_velocity(multibody, &impulse)
 }
 
 fn external_wrench(sets: RapierSets<'_>, handle: RigidBodyHandle, gravity: Vector) -> Vector6<f64> {
@@ -123,11 +159,15 @@ pub(super) fn write_articulations(
         });
         let wrenches: Vec<Vector6<f64>> = wrenches.collect();
         let Some(multibody) = parts.multibody_joints.get_multibody_mut(read.multibody) else { continue };
-        let mut impulse = nalgebra::DVector::<f32>::zeros(multibody.ndofs());
+        let mut impulse = DVector::<f32>::zeros(multibody.ndofs());
         for ((link, _), wrench) in read.links.iter().zip(&wrenches) {
             impulse += multibody.body_jacobian(*link).tr_mul(&wrench.map(|w| w as f32));
         }
-        let Some(change) = multibody.inv_augmented_mass().solve(&impulse) else { continue };
+        let change = match PassiveJoints::of(multibody, dt, parts.substeps) {
+            Some(passive) => passive.kick(&impulse.map(f64::from)).map(|change| change.map(|c| c as f32)),
+            None => multibody.inv_augmented_mass().solve(&impulse),
+        };
+        let Some(change) = change else { continue };
         if change.iter().all(|c| c.is_finite()) {
             let mut velocity = multibody.generalized_velocity_mut();
             velocity += &change;

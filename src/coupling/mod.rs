@@ -10,6 +10,8 @@ mod parts;
 mod coefficients;
 mod mass_properties;
 
+mod passive_joints;
+
 mod articulations;
 mod shape_meshes;
 

@@ -16,6 +16,8 @@ pub struct PhysicsParts<'a> {
     pub gravity: Vector,
     /// Length of the step \[s\]; of the deformables' and of rapier's.
     pub dt: f32,
+    /// Rapier's `num_solver_iterations`, its substeps: it takes damping and springs of multibody joints in each.
+    pub substeps: usize,
     /// The rigid bodies.
     pub bodies: &'a mut RigidBodySet,
     /// Their colliders.
@@ -33,6 +35,7 @@ impl<'a> From<&'a mut PhysicsWorld> for PhysicsParts<'a> {
         Self {
             gravity: physics.gravity,
             dt: physics.integration_parameters.dt,
+            substeps: physics.integration_parameters.num_solver_iterations,
             bodies: &mut physics.bodies,
             colliders: &physics.colliders,
             narrow_phase: &physics.narrow_phase,
@@ -94,6 +97,8 @@ pub(crate) struct StepContext<'a> {
     pub gravity: Vec3,
     /// Length of the step \[s\].
     pub h: f64,
+    /// Of rapier in it.
+    pub substeps: usize,
     pub hooks: &'a dyn DeformableHooks,
 }
 

@@ -35,7 +35,7 @@ fn insert_box(physics: &mut PhysicsWorld, body: RigidBodyBuilder) -> RigidBodyHa
 }
 
 fn context<'a>(parts: &'a PhysicsParts<'_>) -> StepContext<'a> {
-    StepContext { sets: parts.sets(), gravity: from_real(parts.gravity), h: H, hooks: &() }
+    StepContext { sets: parts.sets(), gravity: from_real(parts.gravity), h: H, substeps: 4, hooks: &() }
 }
 
 fn read(physics: &mut PhysicsWorld, body: RigidBodyHandle) -> RigidProxy {

@@ -30,6 +30,7 @@ use std::fmt;
 ///     let mut parts = PhysicsParts {
 ///         gravity: physics.gravity,
 ///         dt: physics.integration_parameters.dt,
+///         substeps: physics.integration_parameters.num_solver_iterations,
 ///         bodies: &mut physics.bodies,
 ///         colliders: &physics.colliders,
 ///         narrow_phase: &physics.narrow_phase,

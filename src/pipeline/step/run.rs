@@ -32,8 +32,13 @@ impl StepScratch {
             return;
         }
         parts.wake(&deformables.take_released());
-        let context =
-            StepContext { sets: parts.sets(), gravity: from_real(gravity), h: f64::from(dt), hooks };
+        let context = StepContext {
+            sets: parts.sets(),
+            gravity: from_real(gravity),
+            h: f64::from(dt),
+            substeps: parts.substeps,
+            hooks,
+        };
         self.solve_bodies(parameters, deformables, &context);
         let mut clock = Stopwatch::start();
         let asleep = &self.sleeping.rigid;
