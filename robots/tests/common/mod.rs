@@ -1,0 +1,149 @@
+//! The models of the tests in a world with a floor.
+#![allow(dead_code)]
+
+use foible_robots::{JointSolver, Robot, RobotBuilder};
+use foible3d::prelude::*;
+use rapier3d::prelude::*;
+
+/// Steps per second.
+pub const RATE: f32 = 120.0;
+/// Of pads and objects; rapier and foible3d take the mean.
+pub const FRICTION: f32 = 0.8;
+pub const GRAVITY: f32 = 9.81;
+
+/// A robot and an object on a floor.
+pub struct Scene {
+    pub physics: PhysicsWorld,
+    pub deformables: DeformableWorld,
+    pub robot: Robot,
+    pub floor: ColliderHandle,
+    /// What the motors draw to.
+    targets: Vec<(&'static str, f32, [f32; 2])>,
+}
+
+/// Stiffness and damping of motors: of arms, and of fingers.
+pub const STIFF: [f32; 2] = [1.0e5, 5.0e3];
+pub const FINGER: [f32; 2] = [4.0e3, 1.0e2];
+
+impl Scene {
+    pub fn new(builder: RobotBuilder, solver: JointSolver) -> Self {
+        let mut physics = PhysicsWorld::new();
+        physics.gravity = Vector::NEG_Z * GRAVITY;
+        physics.integration_parameters.dt = 1.0 / RATE;
+        let ground = RigidBodyBuilder::fixed().translation(Vector::NEG_Z * 0.05);
+        let floor = ColliderBuilder::cuboid(1.0, 1.0, 0.05).friction(FRICTION);
+        let (_, floor) = physics.insert(ground, floor);
+        let mut deformables = DeformableWorld::new();
+        let robot = builder.joint_solver(solver).insert(&mut physics, &mut deformables);
+        let robot = robot.unwrap_or_else(|error| panic!("{error}"));
+        Self { physics, deformables, robot, floor, targets: Vec::new() }
+    }
+
+    pub fn arm(solver: JointSolver) -> Self {
+        let builder = RobotBuilder::urdf("models/arm.urdf").soft_parts("models/arm.soft.toml");
+        let mut scene = Self::new(builder, solver);
+        for (joint, gains) in
+            [("swing", STIFF), ("lift", STIFF), ("wrist", STIFF), ("left", FINGER), ("right", FINGER)]
+        {
+            scene.drive(joint, 0.0, gains);
+        }
+        scene
+    }
+
+    pub fn put(&mut self, shape: ColliderBuilder, mass: f32, at: Vector) -> RigidBodyHandle {
+        let body = RigidBodyBuilder::dynamic().translation(at).can_sleep(false);
+        self.physics.insert(body, shape.mass(mass).friction(FRICTION)).0
+    }
+
+    /// Draws a joint to a place from now on.
+    pub fn drive(&mut self, joint: &'static str, target: f32, gains: [f32; 2]) {
+        let [stiffness, damping] = gains;
+        let set = self.robot.set_motor_position(&mut self.physics, joint, target, stiffness, damping);
+        set.unwrap_or_else(|error| panic!("{error}"));
+        self.targets.retain(|(name, ..)| *name != joint);
+        self.targets.push((joint, target, gains));
+    }
+
+    pub fn step(&mut self) {
+        self.robot.step(&mut self.physics, &mut self.deformables);
+    }
+
+    pub fn wait(&mut self, seconds: f32) {
+        for _ in 0..(seconds * RATE) as usize {
+            self.step();
+        }
+    }
+
+    /// Moves joints smoothly to places, all at once; `each` sees the scene after every step.
+    pub fn go(&mut self, to: &[(&'static str, f32)], seconds: f32, mut each: impl FnMut(&Self)) {
+        let from: Vec<(&'static str, f32, f32, [f32; 2])> = to
+            .iter()
+            .map(|(joint, end)| {
+                let (_, start, gains) =
+                    self.targets.iter().find(|(name, ..)| name == joint).expect("a driven joint");
+                (*joint, *start, *end, *gains)
+            })
+            .collect();
+        let steps = (seconds * RATE) as usize;
+        for step in 1..=steps {
+            let t = step as f32 / steps as f32;
+            // Jerks neither at its beginning nor at its end.
+            let part = t * t * t * (10.0 - 15.0 * t + 6.0 * t * t);
+            for (joint, start, end, gains) in &from {
+                self.drive(joint, start + (end - start) * part, *gains);
+            }
+            self.step();
+            each(self);
+        }
+    }
+
+    pub fn place(&self, body: RigidBodyHandle) -> Vector {
+        self.physics.bodies[body].translation()
+    }
+
+    /// Pose of a body in a link's frame.
+    pub fn in_link(&self, body: RigidBodyHandle, link: &str) -> Pose {
+        let link = self.robot.link(link).expect("a link").body;
+        self.physics.bodies[link].position().inverse() * self.physics.bodies[body].position()
+    }
+
+    /// The vertices of a part that touch a body now.
+    pub fn touching(&self, part: &str, body: RigidBodyHandle) -> Vec<usize> {
+        let handle = self.robot.part(part).expect("a part").body;
+        let collider = self.physics.bodies[body].colliders()[0];
+        let pressed = self.deformables.contacts_of(handle).filter(|c| c.collider == collider);
+        let corners = pressed.flat_map(|c| (0..3).filter(|i| c.weights[*i] > 0.1).map(|i| c.vertices[i]));
+        let all: std::collections::BTreeSet<usize> = corners.collect();
+        all.into_iter().collect()
+    }
+
+    /// Mean place of some vertices of a part in a body's frame \[m\]: what is held between pads slips by what this changes,
+    /// however the pads give way.
+    pub fn mark(&self, part: &str, vertices: &[usize], body: RigidBodyHandle) -> Vector {
+        let handle = self.robot.part(part).expect("a part").body;
+        let pose = self.physics.bodies[body].position().inverse();
+        let place = |v: &usize| {
+            let x = self.deformables.bodies[handle].position(*v).expect("a vertex");
+            pose * Vector::from_array(x.map(|c| c as f32))
+        };
+        vertices.iter().map(place).sum::<Vector>() / vertices.len() as f32
+    }
+
+    pub fn force_on(&self, part: &str) -> Vector {
+        let attachment = self.robot.part(part).expect("a part").attachment.expect("an attached part");
+        self.deformables.bodies.attachment(attachment).expect("an attachment").force()
+    }
+
+    pub fn is_finite(&self) -> bool {
+        let rigid =
+            self.physics.bodies.iter().all(|(_, b)| {
+                b.translation().is_finite() && b.rotation().is_finite() && b.linvel().is_finite()
+            });
+        rigid
+            && self
+                .deformables
+                .bodies
+                .iter()
+                .all(|(_, b)| !b.is_quarantined() && b.center_of_mass().iter().all(|c| c.is_finite()))
+    }
+}
