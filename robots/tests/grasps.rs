@@ -1,0 +1,167 @@
+//! Random boxes, balls and cylinders, gripped by the arm's soft pads, lifted and held.
+
+mod common;
+
+use common::{FINGER, GRAVITY, RATE, Scene};
+use fastrand::Rng;
+use foible_robots::JointSolver;
+use rapier3d::prelude::*;
+
+/// Distance of a pad's face from the hand's middle when the fingers are where they were put in \[m\].
+const OPEN: f32 = 0.043;
+/// Friction of the pads.
+const PAD_FRICTION: f32 = 0.8;
+
+/// What is gripped, and how hard.
+#[derive(Clone, Debug)]
+struct Grasp {
+    shape: SharedShape,
+    kind: &'static str,
+    /// Half the width between the pads, and of the height \[m\].
+    half: [f32; 2],
+    turn: Rotation,
+    /// \[kg\]
+    mass: f32,
+    friction: f32,
+    /// Off the hand's middle, along the pads and across \[m\].
+    off: [f32; 2],
+    /// Squeeze over what friction asks for.
+    margin: f32,
+}
+
+fn between(rng: &mut Rng, least: f32, largest: f32) -> f32 {
+    least + (largest - least) * rng.f32()
+}
+
+impl Grasp {
+    fn random(rng: &mut Rng) -> Self {
+        let half = between(rng, 0.012, 0.032);
+        let mut turn = Rotation::IDENTITY;
+        let (kind, shape, halves) = match rng.usize(0..4) {
+            0 => {
+                let (along, up) = (between(rng, 0.012, 0.04), between(rng, 0.012, 0.04));
+                ("box", SharedShape::cuboid(along, half, up), [half, up])
+            }
+            1 => ("ball", SharedShape::ball(half), [half, half]),
+            2 => {
+                let up = between(rng, 0.015, 0.05);
+                turn = Rotation::from_rotation_x(std::f32::consts::FRAC_PI_2);
+                ("standing cylinder", SharedShape::cylinder(up, half), [half, up])
+            }
+            _ => {
+                let along = between(rng, 0.015, 0.05);
+                turn = Rotation::from_rotation_z(std::f32::consts::FRAC_PI_2);
+                ("lying cylinder", SharedShape::cylinder(along, half), [half, half])
+            }
+        };
+        let off = [between(rng, -0.004, 0.004), between(rng, -0.004, 0.004)];
+        let (mass, friction) = (between(rng, 0.03, 0.4), between(rng, 0.4, 1.0));
+        Self { shape, kind, half: halves, turn, mass, friction, off, margin: between(rng, 1.5, 4.0) }
+    }
+
+    /// Of each finger \[N\].
+    fn squeeze(&self) -> f32 {
+        let friction = 0.5 * (self.friction + PAD_FRICTION);
+        self.margin * self.mass * GRAVITY / (2.0 * friction)
+    }
+}
+
+#[derive(Debug)]
+struct Outcome {
+    lifted: f32,
+    /// Of the pads' faces along the object in the last second \[m\].
+    slip: f32,
+    /// Deepest that a pad's vertex was in the object \[m\].
+    deepest: f32,
+    is_finite: bool,
+    /// Whether the object stayed between the fingers.
+    is_between: bool,
+}
+
+/// Depth of the deepest vertex of both pads in the object.
+fn depth(scene: &Scene, grasp: &Grasp, object: RigidBodyHandle) -> f32 {
+    let pose = scene.physics.bodies[object].position();
+    let mut deepest = 0.0f32;
+    for part in ["left pad", "right pad"] {
+        let body = &scene.deformables.bodies[scene.robot.part(part).unwrap().body];
+        for x in (0..body.vertex_count()).map(|v| body.position(v).unwrap()) {
+            let x = Vector::from_array(x.map(|c| c as f32));
+            let projection = grasp.shape.project_point(pose, x, false);
+            if projection.is_inside {
+                deepest = deepest.max((projection.point - x).length());
+            }
+        }
+    }
+    deepest
+}
+
+fn run(grasp: &Grasp) -> Outcome {
+    let mut scene = Scene::arm(JointSolver::Multibody);
+    let [half, up] = grasp.half;
+    let at = Pose::from_parts(Vector::new(0.4 + grasp.off[0], grasp.off[1], up), grasp.turn);
+    let body = RigidBodyBuilder::dynamic().pose(at).can_sleep(false);
+    let shape = ColliderBuilder::new(grasp.shape.clone()).mass(grasp.mass).friction(grasp.friction);
+    let (object, _) = scene.physics.insert(body, shape);
+    // The fingers' ends stay three millimetres above the floor.
+    let down = (up - 0.125).max(-0.107);
+    scene.go(&[("lift", down)], 0.6, |_| ());
+    let closed = OPEN - half + grasp.squeeze() / FINGER[0];
+    let mut deepest = 0.0f32;
+    let mut look = |scene: &Scene| deepest = deepest.max(depth(scene, grasp, object));
+    scene.go(&[("left", closed), ("right", closed)], 0.4, &mut look);
+    scene.go(&[], 0.4, &mut look);
+    let faces = ["left pad", "right pad"].map(|part| scene.touching(part, object));
+    let start = scene.place(object).z;
+    scene.go(&[("lift", down + 0.1)], 0.8, &mut look);
+    scene.go(&[], 0.5, &mut look);
+    let mark = |scene: &Scene| [0, 1].map(|i| scene.mark(["left pad", "right pad"][i], &faces[i], object));
+    let before = if faces.iter().any(Vec::is_empty) { None } else { Some(mark(&scene)) };
+    scene.go(&[], 1.0, &mut look);
+    // Across the faces pads may give way yet.
+    let across = grasp.turn.inverse() * Vector::Y;
+    let slip = before.map_or(f32::INFINITY, |before| {
+        let now = mark(&scene);
+        let along = |i: usize| {
+            let way: Vector = now[i] - before[i];
+            (way - across * way.dot(across)).length()
+        };
+        along(0).max(along(1))
+    });
+    let hand = scene.in_link(object, "hand").translation;
+    Outcome {
+        lifted: scene.place(object).z - start,
+        slip,
+        deepest,
+        is_finite: scene.is_finite(),
+        is_between: hand.y.abs() < 0.06 && hand.x.abs() < 0.03,
+    }
+}
+
+fn check(grasps: usize, seed: u64) {
+    let mut rng = Rng::with_seed(seed);
+    let (mut worst_slip, mut worst_depth, mut failed) = (0.0f32, 0.0f32, Vec::new());
+    for number in 0..grasps {
+        let grasp = Grasp::random(&mut rng);
+        let out = run(&grasp);
+        (worst_slip, worst_depth) = (worst_slip.max(out.slip), worst_depth.max(out.deepest));
+        let is_held = out.lifted > 0.09 && out.slip < 1.0e-4 && out.deepest < 1.0e-3;
+        if !(is_held && out.is_finite && out.is_between) {
+            println!("{number}: {out:?} squeeze {} of {grasp:?}", grasp.squeeze());
+            failed.push(number);
+        }
+    }
+    println!("{grasps} grasps at {RATE}/s: slip below {worst_slip} m, depth below {worst_depth} m");
+    assert!(failed.is_empty(), "{failed:?}");
+}
+
+#[test]
+fn ten_grasps_hold() {
+    check(10, 7);
+}
+
+/// Two minutes on one core.
+#[test]
+#[ignore = "two minutes"]
+fn two_hundred_grasps_hold() {
+    check(200, 8);
+}
