@@ -7,6 +7,8 @@ use crate::builder::JointSolver;
 use crate::error::{RobotError, Warning};
 use crate::rigid::{Loaded, RigidJoint, RigidLink, RigidPart, shapes_of};
 use crate::xml::{Element, parse};
+use rapier3d::glamx::EulerRot;
+use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d_urdf::urdf_rs::Geometry;
 use rapier3d_urdf::{UrdfLoaderOptions, UrdfRobot, urdf_rs};
 use std::collections::BTreeMap;
@@ -42,7 +44,8 @@ pub(crate) fn read(
     let fail =
         |error: urdf_rs::UrdfError| RobotError::Syntax { place: root.place(), reason: error.to_string() };
     let read = urdf_rs::read_from_string(text).map_err(fail)?;
-    let robot = UrdfRobot::from_robot(&read, options.clone(), folder);
+    let mut robot = UrdfRobot::from_robot(&read, options.clone(), folder);
+    place_roots(&mut robot, &read, &options.shift);
     let rigid_links: Vec<RigidLink> = robot
         .links
         .iter()
@@ -65,6 +68,34 @@ pub(crate) fn read(
         gravity: None,
         warnings,
     })
+}
+
+/// Puts what hangs on an empty root by a fixed joint to where the joint has it: the loader takes root and joint out, and forgets
+/// the joint's origin.
+fn place_roots(robot: &mut UrdfRobot, read: &urdf_rs::Robot, shift: &Pose) {
+    let is_root = |number: usize| robot.joints.iter().all(|joint| joint.link2 != number);
+    let roots: Vec<usize> = (0..robot.links.len()).filter(|number| is_root(*number)).collect();
+    for root in roots {
+        let mut name = &read.links[robot.links[root].urdf_link_index].name;
+        let mut above = Pose::IDENTITY;
+        while let Some(joint) = read.joints.iter().find(|joint| joint.child.link == *name) {
+            above = to_pose(&joint.origin) * above;
+            name = &joint.parent.link;
+        }
+        let by = shift * above * shift.inverse();
+        let mut moved = vec![root];
+        while let Some(link) = moved.pop() {
+            let body = &mut robot.links[link].body;
+            body.set_position(by * body.position(), false);
+            moved.extend(robot.joints.iter().filter(|joint| joint.link1 == link).map(|joint| joint.link2));
+        }
+    }
+}
+
+fn to_pose(origin: &urdf_rs::Pose) -> Pose {
+    let [roll, pitch, yaw] = origin.rpy.0.map(|angle| angle as f32);
+    let rotation = Rotation::from_euler(EulerRot::ZYX, yaw, pitch, roll);
+    Pose::from_parts(Vector::from_array(origin.xyz.0.map(|c| c as f32)), rotation)
 }
 
 /// The elements of a kind by their names.

@@ -6,9 +6,11 @@ use common::{FINGER, GRAVITY, RATE, Scene};
 use fastrand::Rng;
 use foible_robots::JointSolver;
 use rapier3d::prelude::*;
+use std::collections::BTreeMap;
 
 /// Distance of a pad's face from the hand's middle when the fingers are where they were put in \[m\].
 const OPEN: f32 = 0.043;
+const PADS: [&str; 2] = ["left pad", "right pad"];
 /// Friction of the pads.
 const PAD_FRICTION: f32 = 0.8;
 
@@ -71,6 +73,10 @@ struct Outcome {
     lifted: f32,
     /// Of the pads' faces along the object in the last second \[m\].
     slip: f32,
+    /// Turn of the object against the fingers in the last second \[rad\].
+    turn: f32,
+    /// Of the weaker pad before the lift \[N\].
+    squeeze: f32,
     /// Deepest that a pad's vertex was in the object \[m\].
     deepest: f32,
     is_finite: bool,
@@ -82,7 +88,7 @@ struct Outcome {
 fn depth(scene: &Scene, grasp: &Grasp, object: RigidBodyHandle) -> f32 {
     let pose = scene.physics.bodies[object].position();
     let mut deepest = 0.0f32;
-    for part in ["left pad", "right pad"] {
+    for part in PADS {
         let body = &scene.deformables.bodies[scene.robot.part(part).unwrap().body];
         for x in (0..body.vertex_count()).map(|v| body.position(v).unwrap()) {
             let x = Vector::from_array(x.map(|c| c as f32));
@@ -105,20 +111,31 @@ fn run(grasp: &Grasp) -> Outcome {
     // The fingers' ends stay three millimetres above the floor.
     let down = (up - 0.125).max(-0.107);
     scene.go(&[("lift", down)], 0.6, |_| ());
-    let closed = OPEN - half + grasp.squeeze() / FINGER[0];
     let mut deepest = 0.0f32;
     let mut look = |scene: &Scene| deepest = deepest.max(depth(scene, grasp, object));
+    let mut closed = OPEN - half;
     scene.go(&[("left", closed), ("right", closed)], 0.4, &mut look);
-    scene.go(&[], 0.4, &mut look);
-    let faces = ["left pad", "right pad"].map(|part| scene.touching(part, object));
+    // On until both pads press with the squeeze: fingers and pads give way.
+    for _ in 0..(RATE as usize) {
+        let missing = grasp.squeeze() - PADS.iter().map(|pad| scene.press(pad, object)).sum::<f32>() / 2.0;
+        closed += 0.1 * missing / FINGER[0];
+        ["left", "right"].into_iter().for_each(|finger| scene.drive(finger, closed, FINGER));
+        scene.step();
+        look(&scene);
+    }
+    let squeeze = PADS.iter().map(|pad| scene.press(pad, object)).fold(f32::INFINITY, f32::min);
     let start = scene.place(object).z;
     scene.go(&[("lift", down + 0.1)], 0.8, &mut look);
     scene.go(&[], 0.5, &mut look);
-    let mark = |scene: &Scene| [0, 1].map(|i| scene.mark(["left pad", "right pad"][i], &faces[i], object));
-    let before = if faces.iter().any(Vec::is_empty) { None } else { Some(mark(&scene)) };
+    let points = PADS.map(|pad| scene.pressed(pad, object));
+    let mark = |scene: &Scene| [0, 1].map(|i| scene.mark(PADS[i], &points[i], object));
+    let before = if points.iter().any(Vec::is_empty) { None } else { Some(mark(&scene)) };
+    let turned = scene.in_link(object, "left_finger").rotation;
     scene.go(&[], 1.0, &mut look);
-    // Across the faces pads may give way yet.
-    let across = grasp.turn.inverse() * Vector::Y;
+    // Of small turns the cosine is one in single precision.
+    let turn = 2.0 * (turned.inverse() * scene.in_link(object, "left_finger").rotation).xyz().length();
+    // Across the faces pads may give way yet; what turns between them takes that direction along.
+    let across = scene.physics.bodies[object].rotation().inverse() * Vector::Y;
     let slip = before.map_or(f32::INFINITY, |before| {
         let now = mark(&scene);
         let along = |i: usize| {
@@ -131,6 +148,8 @@ fn run(grasp: &Grasp) -> Outcome {
     Outcome {
         lifted: scene.place(object).z - start,
         slip,
+        turn,
+        squeeze,
         deepest,
         is_finite: scene.is_finite(),
         is_between: hand.y.abs() < 0.06 && hand.x.abs() < 0.03,
@@ -140,17 +159,21 @@ fn run(grasp: &Grasp) -> Outcome {
 fn check(grasps: usize, seed: u64) {
     let mut rng = Rng::with_seed(seed);
     let (mut worst_slip, mut worst_depth, mut failed) = (0.0f32, 0.0f32, Vec::new());
+    let mut turns: BTreeMap<&str, (f32, usize)> = BTreeMap::new();
     for number in 0..grasps {
         let grasp = Grasp::random(&mut rng);
         let out = run(&grasp);
         (worst_slip, worst_depth) = (worst_slip.max(out.slip), worst_depth.max(out.deepest));
+        let (turn, count) = turns.entry(grasp.kind).or_default();
+        (*turn, *count) = (turn.max(out.turn), *count + 1);
         let is_held = out.lifted > 0.09 && out.slip < 1.0e-4 && out.deepest < 1.0e-3;
         if !(is_held && out.is_finite && out.is_between) {
-            println!("{number}: {out:?} squeeze {} of {grasp:?}", grasp.squeeze());
+            println!("{number}: {out:?}, squeeze {} N of {grasp:?}", grasp.squeeze());
             failed.push(number);
         }
     }
     println!("{grasps} grasps at {RATE}/s: slip below {worst_slip} m, depth below {worst_depth} m");
+    println!("largest turn in a second [rad], and number: {turns:?}");
     assert!(failed.is_empty(), "{failed:?}");
 }
 

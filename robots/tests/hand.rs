@@ -24,7 +24,7 @@ fn lift(solver: JointSolver) {
     let close: Vec<(&'static str, f32)> = KNUCKLES.iter().map(|k| (*k, -0.09)).collect();
     scene.go(&close, 0.5, |_| ());
     scene.wait(0.5);
-    let faces = TIPS.map(|tip| scene.touching(tip, object));
+    let faces = TIPS.map(|tip| scene.pressed(tip, object));
     assert!(faces.iter().all(|face| face.len() > 3), "{faces:?}");
     let mut marks: Vec<[Vector; 3]> = Vec::new();
     let mut look = |scene: &Scene| {

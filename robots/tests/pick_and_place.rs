@@ -29,7 +29,7 @@ fn pick_and_place(solver: JointSolver, swing: f32) -> Outcome {
     scene.go(&[("lift", DOWN)], 1.0, |_| ());
     scene.go(&[("left", TOUCH + 0.003), ("right", TOUCH + 0.003)], 0.5, |_| ());
     scene.wait(0.3);
-    let face = scene.touching("left pad", object);
+    let face = scene.pressed("left pad", object);
     assert!(face.len() > 4, "{face:?}");
     let mut marks: Vec<Vector> = Vec::new();
     let mut look = |scene: &Scene| marks.push(scene.mark("left pad", &face, object));

@@ -220,7 +220,7 @@ fn from_file(flexcomp: &Flexcomp, settings: &Settings<'_>) -> Result<FlexMesh, F
 }
 
 fn direct(flexcomp: &Flexcomp) -> Result<FlexMesh, Fault> {
-    if flexcomp.points.len() % 3 != 0 {
+    if !flexcomp.points.len().is_multiple_of(3) {
         let count = flexcomp.points.len();
         return Err(Fault::Unsupported(format!("{count} numbers are no points: each has three")));
     }
@@ -228,7 +228,7 @@ fn direct(flexcomp: &Flexcomp) -> Result<FlexMesh, Fault> {
     // Those beyond 32 bits are out of range too, which the mesh finds.
     let id = |index: usize| u32::try_from(flexcomp.elements[index]).unwrap_or(u32::MAX);
     let (count, corners) = (flexcomp.elements.len(), flexcomp.dim + 1);
-    if count % corners != 0 {
+    if !count.is_multiple_of(corners) {
         return Err(Fault::Unsupported(format!("{count} numbers are no elements of {corners} points")));
     }
     match flexcomp.dim {

@@ -26,20 +26,21 @@ pub(super) fn pinned(flexcomp: &Flexcomp, points: usize) -> Result<BTreeSet<usiz
     for id in &pins.ids {
         all.insert(number("id", *id)?);
     }
-    if pins.ranges.len() % 2 != 0 {
+    if !pins.ranges.len().is_multiple_of(2) {
         return Err(bad("range", format!("{:?}", pins.ranges), "pairs of numbers"));
     }
     for ends in pins.ranges.chunks_exact(2) {
         all.extend(number("range", ends[0])?..=number("range", ends[1])?);
     }
     let has_grid = flexcomp.kind == Kind::Grid && flexcomp.dim > 1;
-    if !has_grid && !(pins.grid.is_empty() && pins.grid_ranges.is_empty()) {
+    let names_places = !(pins.grid.is_empty() && pins.grid_ranges.is_empty());
+    if names_places && !has_grid {
         return Err(bad("grid", "there".to_string(), "left out but of grids with dim 2 or 3"));
     }
     let dim = flexcomp.dim;
     for (key, of, numbers) in [("grid", dim, &pins.grid), ("gridrange", 2 * dim, &pins.grid_ranges)] {
         let is_in = |(i, n): (usize, &usize)| *n < flexcomp.count[i % dim];
-        if numbers.len() % of != 0 || !numbers.iter().enumerate().all(is_in) {
+        if !numbers.len().is_multiple_of(of) || !numbers.iter().enumerate().all(is_in) {
             return Err(bad(key, format!("{numbers:?}"), "places in the grid"));
         }
         for place in numbers.chunks_exact(of) {

@@ -107,26 +107,35 @@ impl Scene {
         self.physics.bodies[link].position().inverse() * self.physics.bodies[body].position()
     }
 
-    /// The vertices of a part that touch a body now.
-    pub fn touching(&self, part: &str, body: RigidBodyHandle) -> Vec<usize> {
+    /// The point of a part that is pressed by a body: its vertices with their shares in the force. Empty if it is not.
+    pub fn pressed(&self, part: &str, body: RigidBodyHandle) -> Vec<(usize, f32)> {
         let handle = self.robot.part(part).expect("a part").body;
         let collider = self.physics.bodies[body].colliders()[0];
-        let pressed = self.deformables.contacts_of(handle).filter(|c| c.collider == collider);
-        let corners = pressed.flat_map(|c| (0..3).filter(|i| c.weights[*i] > 0.1).map(|i| c.vertices[i]));
-        let all: std::collections::BTreeSet<usize> = corners.collect();
-        all.into_iter().collect()
+        let contacts = || self.deformables.contacts_of(handle).filter(|c| c.collider == collider);
+        let total: f32 = contacts().map(|c| c.force.length()).sum();
+        let shares = contacts().flat_map(|c| {
+            let share = c.force.length() / total.max(f32::MIN_POSITIVE);
+            (0..3).map(move |i| (c.vertices[i], share * c.weights[i] as f32))
+        });
+        shares.filter(|(_, share)| *share > 0.0).collect()
     }
 
-    /// Mean place of some vertices of a part in a body's frame \[m\]: what is held between pads slips by what this changes,
-    /// however the pads give way.
-    pub fn mark(&self, part: &str, vertices: &[usize], body: RigidBodyHandle) -> Vector {
+    /// Where such a point is in a body's frame \[m\]: what is held between pads slips by what this changes, however the pads
+    /// give way and however it turns about the line between them.
+    pub fn mark(&self, part: &str, point: &[(usize, f32)], body: RigidBodyHandle) -> Vector {
         let handle = self.robot.part(part).expect("a part").body;
         let pose = self.physics.bodies[body].position().inverse();
-        let place = |v: &usize| {
+        let place = |(v, share): &(usize, f32)| {
             let x = self.deformables.bodies[handle].position(*v).expect("a vertex");
-            pose * Vector::from_array(x.map(|c| c as f32))
+            pose * Vector::from_array(x.map(|c| c as f32)) * *share
         };
-        vertices.iter().map(place).sum::<Vector>() / vertices.len() as f32
+        point.iter().map(place).sum()
+    }
+
+    /// Force with which a part presses on a body \[N\].
+    pub fn press(&self, part: &str, body: RigidBodyHandle) -> f32 {
+        let handle = self.robot.part(part).expect("a part").body;
+        self.deformables.contact_force(handle, self.physics.bodies[body].colliders()[0]).length()
     }
 
     pub fn force_on(&self, part: &str) -> Vector {
