@@ -141,6 +141,16 @@ fn error(attributes: &str, children: &str) -> RobotError {
 }
 
 #[test]
+fn shapes_whose_files_are_missing_are_listed() {
+    let text = "<mujoco>\n<asset><mesh name=\"m\" file=\"none.stl\"/></asset>\n<worldbody>\n\
+        <body name=\"b\"><geom type=\"mesh\" mesh=\"m\"/><geom size=\"0.1\"/></body>\n</worldbody>\n</mujoco>";
+    let (mut physics, mut deformables) = (PhysicsWorld::new(), DeformableWorld::new());
+    let robot = RobotBuilder::mjcf_text(text, "models").insert(&mut physics, &mut deformables).unwrap();
+    let warnings: Vec<String> = robot.warnings().iter().map(ToString::to_string).collect();
+    assert_eq!(warnings, ["<mjcf>:4: body `b`: 1 of its shapes could not be made, and do not collide"]);
+}
+
+#[test]
 fn errors_name_line_element_and_value() {
     let stiff = "<elasticity young=\"1e5\" poisson=\"0.3\"/>";
     let solid = "name=\"f\" dim=\"3\" count=\"3 3 3\"";

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{FINGER, GRAVITY, RATE, Scene};
+use common::{FINGER, GRAVITY, PAD_CELLS, RATE, Scene};
 use fastrand::Rng;
 use foible_robots::JointSolver;
 use rapier3d::prelude::*;
@@ -75,7 +75,7 @@ struct Outcome {
     slip: f32,
     /// Turn of the object against the fingers in the last second \[rad\].
     turn: f32,
-    /// Of the weaker pad before the lift \[N\].
+    /// Of the weaker pad, in the air \[N\].
     squeeze: f32,
     /// Deepest that a pad's vertex was in the object \[m\].
     deepest: f32,
@@ -102,7 +102,10 @@ fn depth(scene: &Scene, grasp: &Grasp, object: RigidBodyHandle) -> f32 {
 }
 
 fn run(grasp: &Grasp) -> Outcome {
-    let mut scene = Scene::arm(JointSolver::Multibody);
+    // A ball on a cell of its own size is touched at one point on each side, which resists no twist: it would turn about the line
+    // between them for ever (three radians and a millimetre in a second were measured). Half the cells, and it is held.
+    let cells = if grasp.kind == "ball" { [8, 3, 8] } else { PAD_CELLS };
+    let mut scene = Scene::arm_with_pads(JointSolver::Multibody, cells);
     let [half, up] = grasp.half;
     let at = Pose::from_parts(Vector::new(0.4 + grasp.off[0], grasp.off[1], up), grasp.turn);
     let body = RigidBodyBuilder::dynamic().pose(at).can_sleep(false);
@@ -123,10 +126,11 @@ fn run(grasp: &Grasp) -> Outcome {
         scene.step();
         look(&scene);
     }
-    let squeeze = PADS.iter().map(|pad| scene.press(pad, object)).fold(f32::INFINITY, f32::min);
     let start = scene.place(object).z;
     scene.go(&[("lift", down + 0.1)], 0.8, &mut look);
     scene.go(&[], 0.5, &mut look);
+    // Off the floor, whose friction carries a part of what the fingers differ by.
+    let squeeze = PADS.iter().map(|pad| scene.press(pad, object)).fold(f32::INFINITY, f32::min);
     let points = PADS.map(|pad| scene.pressed(pad, object));
     let mark = |scene: &Scene| [0, 1].map(|i| scene.mark(PADS[i], &points[i], object));
     let before = if points.iter().any(Vec::is_empty) { None } else { Some(mark(&scene)) };
@@ -163,12 +167,14 @@ fn check(grasps: usize, seed: u64) {
     for number in 0..grasps {
         let grasp = Grasp::random(&mut rng);
         let out = run(&grasp);
+        let asked = grasp.squeeze();
+        assert!((out.squeeze / asked - 1.0).abs() < 0.1, "{number}: {} N of {asked} N", out.squeeze);
         (worst_slip, worst_depth) = (worst_slip.max(out.slip), worst_depth.max(out.deepest));
         let (turn, count) = turns.entry(grasp.kind).or_default();
         (*turn, *count) = (turn.max(out.turn), *count + 1);
         let is_held = out.lifted > 0.09 && out.slip < 1.0e-4 && out.deepest < 1.0e-3;
         if !(is_held && out.is_finite && out.is_between) {
-            println!("{number}: {out:?}, squeeze {} N of {grasp:?}", grasp.squeeze());
+            println!("{number}: {out:?}, squeeze {asked} N of {grasp:?}");
             failed.push(number);
         }
     }

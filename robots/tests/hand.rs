@@ -68,3 +68,47 @@ fn tips_do_not_touch_their_fingers_but_do_touch_others() {
         }
     }
 }
+
+/// A fixed palm with five fingers of three links, each with a soft pad around its lower half that dips into the link.
+fn five_fingers() -> String {
+    let mut text = String::from(
+        "<mujoco><worldbody><body name='palm' pos='0 0 1'><geom type='box' size='0.1 0.02 0.02'/>\n",
+    );
+    for finger in 0..5 {
+        let x = 0.04 * finger as f32 - 0.08;
+        for link in 0..3 {
+            let at = if link == 0 { format!("{x} 0 -0.03") } else { "0 0 -0.05".to_string() };
+            text += &format!(
+                "<body name='f{finger}{link}' pos='{at}'><joint name='j{finger}{link}' axis='1 0 0' range='-90 90'/>\n\
+                <geom type='capsule' size='0.008' fromto='0 0 -0.01 0 0 -0.035' mass='0.03'/>\n\
+                <flexcomp name='p{finger}{link}' type='grid' dim='3' count='3 3 3' spacing='0.008 0.008 0.008' \
+                pos='0 -0.008 -0.025' mass='0.004'><elasticity young='1e5' poisson='0.4'/>\
+                <pin gridrange='0 2 0 2 2 2'/></flexcomp>\n"
+            );
+        }
+        text += "</body></body></body>\n";
+    }
+    text + "</body></worldbody></mujoco>"
+}
+
+#[test]
+fn fifteen_pads_of_five_fingers_each_keep_apart_from_their_own_link_only() {
+    let mut scene = Scene::new(RobotBuilder::mjcf_text(five_fingers(), "models"), JointSolver::Multibody);
+    let robot = &scene.robot;
+    assert_eq!((robot.links().len(), robot.joints().len(), robot.parts().len()), (16, 15, 15));
+    let apart = robot.parts().iter().flat_map(|part| {
+        robot.links().iter().map(move |link| (part, link, robot.hooks().are_apart(part.body, link.body)))
+    });
+    for (part, link, is_apart) in apart {
+        assert_eq!(is_apart, part.name[1..] == link.name[1..] && link.name.starts_with('f'), "{}", part.name);
+    }
+    for _ in 0..30 {
+        scene.step();
+        // The pads dip into what carries them, by four millimetres: that is no contact.
+        for part in scene.robot.parts() {
+            let own = scene.robot.link(&part.name.replace('p', "f")).unwrap().colliders[0];
+            assert_eq!(scene.deformables.contact_force(part.body, own), Vector::ZERO);
+        }
+    }
+    assert!(scene.is_finite());
+}

@@ -70,6 +70,7 @@ pub(crate) fn read(
         parts.push(flex_part::plan(flexcomp, (link > 0).then_some(link), carrier, &settings, &mut warnings)?);
     }
     warn_of_drives(&model, &root, &mut warnings);
+    warn_of_lost_shapes(&robot, &model, &root, &mut warnings);
     if pose != Pose::IDENTITY && !robot.bodies[0].colliders.is_empty() {
         warnings
             .push(root.warning("shapes of the world stay where the file has them: the pose moves bodies"));
@@ -135,12 +136,36 @@ fn check_bodies(robot: &MjcfRobot, model: &Model, root: &Element<'_, '_>) -> Res
     Ok(())
 }
 
+/// The loader leaves out shapes whose meshes it cannot read, and writes that to the log only.
+fn warn_of_lost_shapes(
+    robot: &MjcfRobot,
+    model: &Model,
+    root: &Element<'_, '_>,
+    warnings: &mut Vec<Warning>,
+) {
+    for body in robot.bodies.iter().filter(|body| !body.is_intermediate) {
+        let geoms = &model.bodies[body.mjcf_body_id].body.geoms;
+        let solid = geoms.iter().filter(|geom| geom.contype != 0 || geom.conaffinity != 0).count();
+        let lost = solid.saturating_sub(body.colliders.len());
+        if lost > 0 {
+            let element = tree::body_named(root, body.name.as_deref());
+            warnings
+                .push(element.warning(format!("{lost} of its shapes could not be made, and do not collide")));
+        }
+    }
+}
+
 /// Rapier's loader reads these, and leaves them to its user.
 fn warn_of_drives(model: &Model, root: &Element<'_, '_>, warnings: &mut Vec<Warning>) {
-    for (tag, count) in [("actuator", model.actuators.len()), ("sensor", model.sensors.len())] {
+    let read = [
+        ("actuator", model.actuators.len()),
+        ("sensor", model.sensors.len()),
+        ("keyframe", model.keyframes.len()),
+    ];
+    for (tag, count) in read {
         if count > 0 {
             let element = root.child(tag).unwrap_or(*root);
-            let what = format!("{count} of them are not taken up: set the motors of joints by their names");
+            let what = format!("{count} of them are not taken up");
             warnings.push(Warning { place: element.place(), element: tag.to_string(), what });
         }
     }

@@ -10,6 +10,8 @@ pub const RATE: f32 = 120.0;
 /// Of pads and objects; rapier and foible3d take the mean.
 pub const FRICTION: f32 = 0.8;
 pub const GRAVITY: f32 = 9.81;
+/// Cells of the arm's pads in their file.
+pub const PAD_CELLS: [usize; 3] = [4, 2, 4];
 
 /// A robot and an object on a floor.
 pub struct Scene {
@@ -40,7 +42,14 @@ impl Scene {
     }
 
     pub fn arm(solver: JointSolver) -> Self {
-        let builder = RobotBuilder::urdf("models/arm.urdf").soft_parts("models/arm.soft.toml");
+        Self::arm_with_pads(solver, PAD_CELLS)
+    }
+
+    /// The arm with pads of so many cells.
+    pub fn arm_with_pads(solver: JointSolver, cells: [usize; 3]) -> Self {
+        let parts = std::fs::read_to_string("models/arm.soft.toml").expect("the file of soft parts");
+        let parts = parts.replace(&format!("{PAD_CELLS:?}"), &format!("{cells:?}"));
+        let builder = RobotBuilder::urdf("models/arm.urdf").soft_parts_text(parts, "models");
         let mut scene = Self::new(builder, solver);
         for (joint, gains) in
             [("swing", STIFF), ("lift", STIFF), ("wrist", STIFF), ("left", FINGER), ("right", FINGER)]
@@ -132,10 +141,12 @@ impl Scene {
         point.iter().map(place).sum()
     }
 
-    /// Force with which a part presses on a body \[N\].
+    /// Force with which a part presses on a body, across the hand \[N\].
     pub fn press(&self, part: &str, body: RigidBodyHandle) -> f32 {
         let handle = self.robot.part(part).expect("a part").body;
-        self.deformables.contact_force(handle, self.physics.bodies[body].colliders()[0]).length()
+        let hand = self.robot.link("hand").expect("the arm's hand").body;
+        let across = self.physics.bodies[hand].rotation() * Vector::Y;
+        self.deformables.contact_force(handle, self.physics.bodies[body].colliders()[0]).dot(across).abs()
     }
 
     pub fn force_on(&self, part: &str) -> Vector {
