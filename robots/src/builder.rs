@@ -2,8 +2,9 @@
 
 use crate::error::{RobotError, read_text};
 use crate::hooks::RobotHooks;
-use crate::motor::{change_joint, single_axis};
+use crate::motor::{change_joint, read_joint, single_axis};
 use crate::part::PlannedPart;
+use crate::passive;
 use crate::rigid::{Inserted, RigidJoint, RigidPart, insert};
 use crate::robot::{Robot, RobotJoint, RobotLink, RobotPart};
 use crate::{mjcf, part, urdf};
@@ -225,11 +226,15 @@ fn name_joints(joints: &[RigidJoint], inserted: &Inserted, physics: &mut Physics
     let mut named = Vec::with_capacity(joints.len());
     for (joint, inserted) in joints.iter().zip(&inserted.joints) {
         let Some((handle, parent, child)) = *inserted else { continue };
+        let axis = read_joint(physics, handle).and_then(single_axis);
+        let passive = passive::take(physics, handle, axis, joint.passive);
         let Some(data) = change_joint(physics, handle) else { continue };
-        let axis = single_axis(data);
         let limits = axis.and_then(|axis| data.limits(axis)).map(|limits| [limits.min, limits.max]);
         if let (Some(axis), Some(effort)) = (axis, joint.effort) {
             data.set_motor_max_force(axis, effort);
+        }
+        if let Some(axis) = axis {
+            passive::set_rest(data, axis, &passive);
         }
         named.push(RobotJoint {
             name: joint.name.clone(),
@@ -239,8 +244,10 @@ fn name_joints(joints: &[RigidJoint], inserted: &Inserted, physics: &mut Physics
             axis,
             limits,
             effort: joint.effort,
+            passive,
         });
     }
+    passive::make_mass_matrices(physics, named.iter().map(|joint| joint.handle));
     named
 }
 

@@ -9,7 +9,7 @@
 //! | `part` | soft parts: the TOML file, shapes, what is attached |
 //! | `urdf`, `mjcf` | the two kinds of file, checked |
 //! | `hooks` | which pairs of a soft part and a link do not touch |
-//! | `robot`, `motor` | links, joints and parts by name; motors |
+//! | `robot`, `motor`, `passive` | links, joints and parts by name; motors, springs and damping |
 //! | `builder` | the way in |
 //!
 //! What a file says and this package does not do is an error, or one of [`Robot::warnings`].
@@ -27,6 +27,7 @@ mod urdf;
 mod hooks;
 
 mod motor;
+mod passive;
 mod robot;
 
 mod builder;

@@ -1,9 +1,10 @@
 //! Motors of joints, and where joints are.
 
 use crate::error::RobotError;
+use crate::passive::{self, Drive};
 use crate::rigid::RobotJointHandle;
 use crate::robot::{Robot, RobotJoint};
-use rapier3d::dynamics::{GenericJoint, JointAxesMask, JointAxis, MotorModel};
+use rapier3d::dynamics::{GenericJoint, JointAxesMask, JointAxis};
 use rapier3d::pipeline::PhysicsWorld;
 
 /// The axis of a joint that has one.
@@ -16,7 +17,7 @@ pub(crate) fn single_axis(joint: &GenericJoint) -> Option<JointAxis> {
 }
 
 /// The joint behind a handle.
-fn read_joint(physics: &PhysicsWorld, handle: RobotJointHandle) -> Option<&GenericJoint> {
+pub(crate) fn read_joint(physics: &PhysicsWorld, handle: RobotJointHandle) -> Option<&GenericJoint> {
     match handle {
         RobotJointHandle::Impulse(handle) => physics.impulse_joints.get(handle).map(|joint| &joint.data),
         RobotJointHandle::Multibody(handle) => {
@@ -45,7 +46,7 @@ pub(crate) fn change_joint(
 impl Robot {
     /// Has the motor of a joint draw it to a position \[m\] or \[rad\], as a spring of `stiffness` [N/m] or [N m/rad] with
     /// `damping` [N s/m] or [N m s/rad]; within the joint's limits, and with no more than the file's effort or
-    /// [`Robot::set_motor_max_force`]. Returns the position that it is drawn to.
+    /// [`Robot::set_motor_max_force`]. The file's spring and damping of the joint come on top. Returns the position that it is drawn to.
     ///
     /// # Errors
     /// [`RobotError::NoSuch`]; [`RobotError::NoAxis`] of joints with more axes or none; [`RobotError::Motor`] for numbers that are
@@ -135,9 +136,11 @@ impl Robot {
         }
         let axis = axis_of(joint)?;
         let data = change_joint(physics, joint.handle).ok_or_else(|| gone(joint))?;
-        // Newtons and metres: the other model takes gains per mass.
-        data.set_motor_model(axis, MotorModel::ForceBased);
-        data.set_motor(axis, position, speed, stiffness, damping);
+        // What stood for dry friction is a drive now, bounded by the effort alone.
+        if joint.passive.friction > 0.0 && data.motors[axis as usize].max_force == joint.passive.friction {
+            data.set_motor_max_force(axis, joint.effort.unwrap_or(f32::MAX));
+        }
+        passive::set_motor(data, axis, &joint.passive, &Drive { position, speed, stiffness, damping });
         physics.wake_up(joint.child, true);
         Ok(())
     }

@@ -2,6 +2,7 @@
 
 use crate::builder::JointSolver;
 use crate::error::Warning;
+use crate::passive::Passive;
 use rapier3d::prelude::*;
 use rapier3d_mjcf::{MjcfContactHooks, MjcfMultibodyOptions, MjcfRobot};
 use rapier3d_urdf::{UrdfMultibodyOptions, UrdfRobot};
@@ -29,6 +30,8 @@ pub(crate) struct RigidJoint {
     pub name: String,
     /// Greatest force \[N\] or moment \[N m\] of its motor, if the file has one.
     pub effort: Option<f32>,
+    /// Its spring and damping.
+    pub passive: Passive,
 }
 
 /// What the loader has made.

@@ -2,6 +2,7 @@
 
 use crate::error::{RobotError, Warning};
 use crate::hooks::RobotHooks;
+use crate::passive::Passive;
 use crate::rigid::RobotJointHandle;
 use foible3d::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableWorld};
 use rapier3d::dynamics::{JointAxis, RigidBodyHandle};
@@ -37,6 +38,7 @@ pub struct RobotJoint {
     pub limits: Option<[f32; 2]>,
     /// Greatest force \[N\] or moment \[N m\] of its motor, if the file has one.
     pub effort: Option<f32>,
+    pub(crate) passive: Passive,
 }
 
 /// A soft part.

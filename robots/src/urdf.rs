@@ -5,6 +5,7 @@
 
 use crate::builder::JointSolver;
 use crate::error::{RobotError, Warning};
+use crate::passive::Passive;
 use crate::rigid::{Loaded, RigidJoint, RigidLink, RigidPart, shapes_of};
 use crate::xml::{Element, parse};
 use rapier3d::glamx::EulerRot;
@@ -59,7 +60,9 @@ pub(crate) fn read(
     let rigid_joints = robot.joints.iter().map(|joint| {
         let source = &read.joints[joint.source_urdf_joint_index()];
         let effort = source.limit.effort as f32;
-        RigidJoint { name: source.name.clone(), effort: (effort > 0.0).then_some(effort) }
+        let (damping, friction) = source.dynamics.as_ref().map_or((0.0, 0.0), |d| (d.damping, d.friction));
+        let passive = Passive { damping: damping as f32, friction: friction as f32, ..Default::default() };
+        RigidJoint { name: source.name.clone(), effort: (effort > 0.0).then_some(effort), passive }
     });
     Ok(RigidPart {
         joints: rigid_joints.collect(),
@@ -213,7 +216,14 @@ fn check_joint(
             warnings.push(joint.warning("its greatest velocity is not kept to"));
         }
     }
-    for tag in ["mimic", "dynamics", "safety_controller", "calibration"] {
+    if let Some(dynamics) = joint.child("dynamics") {
+        dynamics.not_negative("damping", 0.0)?;
+        let friction = dynamics.not_negative("friction", 0.0)?;
+        if friction > 0.0 && dynamics.number("damping", 0.0)? > 0.0 {
+            warnings.push(joint.warning("its friction is not taken up beside its damping"));
+        }
+    }
+    for tag in ["mimic", "safety_controller", "calibration"] {
         if joint.child(tag).is_some() {
             warnings.push(joint.warning(format!("<{tag}> is not taken up")));
         }

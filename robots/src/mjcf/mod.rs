@@ -10,6 +10,7 @@ mod tree;
 use crate::builder::JointSolver;
 use crate::error::{RobotError, Warning};
 use crate::part::PlannedPart;
+use crate::passive::Passive;
 use crate::rigid::{Loaded, RigidJoint, RigidLink, RigidPart, shapes_of};
 use crate::xml::{Element, parse};
 use rapier3d::math::Pose;
@@ -80,9 +81,16 @@ pub(crate) fn read(
         pose: *body.body.position(),
         shapes: shapes_of(body.colliders.iter()),
     });
-    let joints = robot.joints.iter();
-    let joints =
-        joints.map(|joint| RigidJoint { name: joint.name.clone().unwrap_or_default(), effort: None });
+    let joints = robot.joints.iter().map(|joint| {
+        let passive = Passive {
+            stiffness: joint.spring_stiffness_per_dof,
+            damping: joint.damping_per_dof,
+            rest: joint.spring_ref,
+            friction: joint.frictionloss_per_dof,
+            is_made_later: joint.springdamper.is_some(),
+        };
+        RigidJoint { name: joint.name.clone().unwrap_or_default(), effort: None, passive }
+    });
     let rigid = RigidPart {
         links: links.collect(),
         joints: joints.collect(),
