@@ -76,8 +76,11 @@ pub(crate) fn make_mass_matrices(
     for handle in handles {
         let RobotJointHandle::Multibody(handle) = handle else { continue };
         if let Some((multibody, _)) = physics.multibody_joints.get_mut(handle)
+            // The root is no joint of the file: what moves freely is not damped.
+            && let root = multibody.root().joint().ndofs()
             && multibody.inv_augmented_mass().lu_internal().nrows() != multibody.ndofs()
         {
+            multibody.damping_mut().iter_mut().take(root).for_each(|damping| *damping = 0.0);
             multibody.dof_inverse_inertia(&physics.bodies);
         }
     }

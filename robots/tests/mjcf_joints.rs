@@ -3,7 +3,7 @@
 mod common;
 
 use common::{GRAVITY, Scene};
-use foible_robots::{JointSolver, RobotBuilder};
+use foible_robots::{JointSolver, RobotBuilder, RobotJointHandle};
 
 /// A lever of 0.1 m along x on a hinge about y, with a soft block of 0.1 kg at its end.
 fn lever(joint: &str) -> String {
@@ -75,4 +75,22 @@ fn a_lever_with_a_soft_end_falls_as_a_pendulum_from_the_first_step_on() {
         // The end is soft and of lumped masses: 1.5 % and 0.2 % were measured.
         assert!((angle / expected - 1.0).abs() < 0.03, "armature {armature}: {angle} rad of {expected} rad");
     }
+}
+
+#[test]
+fn a_floating_base_keeps_its_spin() {
+    let text = "<mujoco><worldbody><body name='base' pos='0 0 1'><freejoint/><geom type='box' size='0.05 0.05 0.05' mass='1'/>\n\
+        <body name='arm' pos='0 0 0.06'><joint name='hinge' axis='0 0 1'/>\n\
+        <geom type='sphere' size='0.01' mass='0.01' contype='0' conaffinity='0'/></body></body></worldbody></mujoco>";
+    let mut scene = Scene::new(RobotBuilder::mjcf_text(text, "models"), JointSolver::Multibody);
+    scene.physics.gravity = rapier3d::prelude::Vector::ZERO;
+    let base = scene.robot.link("base").unwrap().body;
+    let RobotJointHandle::Multibody(joint) = scene.robot.joint("hinge").unwrap().handle else { panic!() };
+    let (multibody, _) = scene.physics.multibody_joints.get_mut(joint).unwrap();
+    // Along x, y, z, about x, y, z.
+    multibody.generalized_velocity_mut()[5] = 1.0;
+    scene.wait(1.0);
+    let spin = scene.physics.bodies[base].angvel().z;
+    println!("{spin} rad/s");
+    assert!((spin - 1.0).abs() < 1.0e-3, "{spin} rad/s");
 }
