@@ -76,6 +76,11 @@ pub(crate) fn read(
         warnings
             .push(root.warning("shapes of the world stay where the file has them: the pose moves bodies"));
     }
+    Ok((rigid_part(robot, warnings), parts))
+}
+
+/// Links and joints in the loader's order.
+fn rigid_part(robot: MjcfRobot, warnings: Vec<Warning>) -> RigidPart {
     let links = robot.bodies.iter().enumerate().map(|(number, body)| RigidLink {
         name: body.name.clone().unwrap_or_else(|| unnamed(number)),
         pose: *body.body.position(),
@@ -91,14 +96,13 @@ pub(crate) fn read(
         };
         RigidJoint { name: joint.name.clone().unwrap_or_default(), effort: None, passive }
     });
-    let rigid = RigidPart {
+    RigidPart {
         links: links.collect(),
         joints: joints.collect(),
         gravity: Some(robot.gravity),
         warnings,
         loaded: Loaded::Mjcf(Box::new(robot)),
-    };
-    Ok((rigid, parts))
+    }
 }
 
 fn unnamed(number: usize) -> String {
