@@ -156,7 +156,17 @@ fn libraries_are_named_only_where_they_belong() {
 
 #[test]
 fn files_and_functions_are_short() {
-    for folder in ["src", "tests", "benches", "examples", "cli/src", "cli/tests"] {
+    for folder in [
+        "src",
+        "tests",
+        "benches",
+        "examples",
+        "cli/src",
+        "cli/tests",
+        "robots/src",
+        "robots/tests",
+        "robots/examples",
+    ] {
         for (name, text) in whole_files(folder) {
             let lines = text.lines().count();
             assert!(lines <= LONGEST_FILE, "{folder}/{name} has {lines} lines");
