@@ -133,6 +133,12 @@ pub enum Quantity {
     CavityPressure,
     /// Volume of all cavities of a deformable \[m³\].
     CavityVolume,
+    /// Tension of a cable where it is drawn \[N\].
+    CableTension,
+    /// Length of a cable's way through its points \[m\].
+    CableLength,
+    /// Value of a signal, in the unit of what it drives.
+    Signal,
 }
 
 /// What is taken of the values over time.
@@ -222,6 +228,11 @@ impl Quantity {
         )
     }
 
+    /// Whether cables have it, or signals, and no body.
+    pub fn is_of_actuation(self) -> bool {
+        matches!(self, Self::CableTension | Self::CableLength | Self::Signal)
+    }
+
     /// Whether probes have it.
     pub fn is_of_points(self) -> bool {
         matches!(
@@ -233,10 +244,16 @@ impl Quantity {
     /// Its unit.
     pub fn unit(self) -> &'static str {
         match self {
-            Self::X | Self::Y | Self::Z | Self::Penetration | Self::Drift | Self::Deformation => "m",
+            Self::X
+            | Self::Y
+            | Self::Z
+            | Self::Penetration
+            | Self::Drift
+            | Self::Deformation
+            | Self::CableLength => "m",
             Self::Speed | Self::VelocityY | Self::SlipSpeed => "m/s",
             Self::AccelerationG => "g",
-            Self::Force | Self::ForceSize => "N",
+            Self::Force | Self::ForceSize | Self::CableTension => "N",
             Self::Tilt => "°",
             Self::KineticEnergy
             | Self::ElasticEnergy
@@ -246,7 +263,7 @@ impl Quantity {
             | Self::EnergyBalance => "J",
             Self::Stress | Self::CavityPressure => "Pa",
             Self::CavityVolume => "m³",
-            Self::VolumeRatio | Self::Strain => "",
+            Self::VolumeRatio | Self::Strain | Self::Signal => "",
         }
     }
 }

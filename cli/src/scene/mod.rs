@@ -1,5 +1,6 @@
 //! The scene file: what it may hold, and what is said of one that holds something else.
 
+mod actuation;
 mod check;
 mod control;
 mod deformable;
@@ -12,6 +13,7 @@ mod source;
 mod trigger;
 mod values;
 
+pub use actuation::{ActuatorEntry, Cable, Command, Drives, RoutePoint};
 pub use control::{Attach, Move};
 pub use deformable::{
     Body, Deformable, Elasticity, Fidelity, Filling, Frames, Integrator, Material, Region, RegionMaterial,
@@ -59,6 +61,12 @@ pub struct Scene {
     /// What is held by what.
     #[serde(default)]
     pub attach: Vec<Attach>,
+    /// Cables through points of bodies.
+    #[serde(default)]
+    pub cable: Vec<Cable>,
+    /// Signals, by name.
+    #[serde(default)]
+    pub actuator: Vec<ActuatorEntry>,
     /// How kinematic bodies move.
     #[serde(default, rename = "move")]
     pub moves: Vec<Move>,

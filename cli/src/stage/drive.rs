@@ -24,6 +24,7 @@ pub fn drive(scene: &Scene, stage: &mut Stage, time: f32, dt: f32) {
             body.set_linvel(velocity, true);
         }
     }
+    stage.tell(scene, time, dt);
     for (joint, made) in scene.joint.iter().zip(stage.joints.clone()) {
         let Some(motor) = &joint.motor else { continue };
         for switch in &motor.then {

@@ -67,6 +67,8 @@ impl Stage {
                 .start
                 .get(of)
                 .map_or(f64::NAN, |start| (x - start.position[0]).hypot(z - start.position[2])),
+            Quantity::CableTension | Quantity::CableLength => self.of_cable(quantity, of),
+            Quantity::Signal => self.world.actuators.get(of).map_or(f64::NAN, |signal| signal.value()),
             // A difference over time: the run's.
             Quantity::AccelerationG => f64::NAN,
             energy if energy.is_energy() => self.energy(energy, of),
@@ -74,6 +76,14 @@ impl Stage {
                 Some(Thing::Soft(body)) => self.of_soft(of_soft, body),
                 _ => f64::NAN,
             },
+        }
+    }
+
+    fn of_cable(&self, quantity: Quantity, of: &str) -> f64 {
+        let Some((_, handle)) = self.cables.iter().find(|(name, _)| name == of) else { return f64::NAN };
+        match quantity {
+            Quantity::CableTension => self.world.bodies.cable(*handle).map_or(f64::NAN, |c| c.tension()),
+            _ => self.world.bodies.cable_length(*handle, &self.physics.bodies),
         }
     }
 

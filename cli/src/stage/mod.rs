@@ -1,5 +1,6 @@
 //! A scene file turned into a rapier world and a deformable one, and what can be measured of it.
 
+mod actuation;
 mod drive;
 mod fall;
 mod joints;
@@ -35,6 +36,8 @@ pub struct Stage {
     pub joints: Vec<Motored>,
     /// Attachments, each with the deformable that it holds.
     pub attachments: Vec<(String, DeformableAttachmentHandle)>,
+    /// Cables, in the order of the file.
+    pub cables: Vec<(String, DeformableCableHandle)>,
     /// Of the triggers, in the order of the file, whether they have happened.
     happened: Vec<bool>,
     /// Where everything is at the start.
@@ -67,6 +70,7 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
         probes: Vec::new(),
         joints: Vec::new(),
         attachments: Vec::new(),
+        cables: Vec::new(),
         happened: vec![false; scene.trigger.len()],
         start: BTreeMap::new(),
         losses: losses::Losses::default(),
@@ -84,6 +88,8 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
         stage.deformable.push((name.clone(), handle));
     }
     scene.attach.iter().try_for_each(|attach| stage.attach(attach))?;
+    scene.cable.iter().try_for_each(|cable| stage.lay(cable))?;
+    scene.actuator.iter().try_for_each(|entry| stage.add_actuator(scene, entry))?;
     stage.add_probes(scene);
     // Last, so that joints, attachments and probes are where the file says before it is turned.
     scene.drop.as_ref().map_or(Ok(()), |drop| stage.fall(scene, drop))?;

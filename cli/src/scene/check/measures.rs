@@ -114,6 +114,18 @@ fn check_quantity_of(
     of: &[&Spanned<String>],
     on: Option<&Spanned<String>>,
 ) -> Result<(), Mistake> {
+    if quantity.is_of_actuation() {
+        let known: Vec<&str> = match quantity {
+            Quantity::Signal => scene.actuator.iter().map(|a| a.name.as_ref().as_str()).collect(),
+            _ => scene.cable.iter().map(|c| c.name.as_ref().as_str()).collect(),
+        };
+        let wrong = of.iter().zip(["of", "minus"]).find(|(name, _)| !known.contains(&name.as_ref().as_str()));
+        let what = if quantity == Quantity::Signal { "an actuator" } else { "a cable" };
+        if let Some((name, key)) = wrong {
+            return Err(unknown(name, key, what, &known));
+        }
+        return on.map_or(Ok(()), |on| Err((on.span(), "`on` is for forces and `slip_speed` only".into())));
+    }
     let all: Vec<&str> = scene.names().collect();
     for (name, key) in of.iter().zip(["of", "minus"]) {
         let text = name.as_ref().as_str();

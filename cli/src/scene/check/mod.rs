@@ -1,10 +1,12 @@
 //! Whether a scene makes sense, section by section.
 
+mod actuation;
 mod measures;
 mod shapes;
 
 use super::mistake::{Mistake, unknown};
 use super::{Body, Deformable, Drop, Joint, JointKind, Kind, Rigid, Scene, Trigger};
+use actuation::{check_actuator, check_cable};
 use measures::{check_expectation, check_measure, check_when};
 use shapes::{body_problem, shape_problem};
 use toml::Spanned;
@@ -25,6 +27,8 @@ pub fn check(scene: &Scene) -> Result<(), Mistake> {
     scene.rigid.iter().try_for_each(check_mass)?;
     scene.joint.iter().try_for_each(|joint| check_joint(scene, joint))?;
     check_control(scene)?;
+    scene.cable.iter().try_for_each(|cable| check_cable(scene, cable))?;
+    scene.actuator.iter().try_for_each(|actuator| check_actuator(scene, actuator))?;
     scene.trigger.iter().try_for_each(|trigger| check_trigger(scene, trigger))?;
     check_bodies(scene)?;
     check_probes(scene)?;
@@ -47,7 +51,14 @@ fn check_size(scene: &Scene) -> Result<(), Mistake> {
     }
     let lists =
         [scene.rigid.len(), scene.deformable.len(), scene.joint.len(), scene.attach.len(), scene.moves.len()];
-    let watched = [scene.trigger.len(), scene.probe.len(), scene.measure.len(), scene.expect.len()];
+    let watched = [
+        scene.cable.len(),
+        scene.actuator.len(),
+        scene.trigger.len(),
+        scene.probe.len(),
+        scene.measure.len(),
+        scene.expect.len(),
+    ];
     if lists.into_iter().chain(watched).any(|entries| entries > MOST_ENTRIES) {
         return Err((
             duration.span(),
@@ -126,7 +137,8 @@ fn deformable_names(scene: &Scene) -> Vec<&str> {
 
 fn check_names(scene: &Scene) -> Result<(), Mistake> {
     let mut names: Vec<&str> = Vec::new();
-    for name in scene.spanned_names() {
+    let driven = scene.cable.iter().map(|c| &c.name).chain(scene.actuator.iter().map(|a| &a.name));
+    for name in scene.spanned_names().chain(driven) {
         let text = name.as_ref().as_str();
         if names.contains(&text) {
             return Err((name.span(), format!("`name` \"{text}\" is taken; every name must be unique")));

@@ -1,0 +1,77 @@
+//! Cables and signals of scene files.
+
+mod common;
+
+use common::{number, outcome};
+
+/// A muscle, a chamber, a hinge and a hoist, each with a signal.
+fn scene() -> String {
+    let lattice = "lattice = { half_extents = [0.05, 0.05, 0.05], cells = [4, 4, 4]";
+    let material =
+        "material = { youngs_modulus = 1e6, poisson_ratio = 0.3, density = 1000, mass_damping = 5 }";
+    format!(
+        r#"
+        world = {{ duration = 2.0, dt = 0.01 }}
+        rigid = [
+            {{ name = "base", kind = "fixed", shape = {{ ball = {{ radius = 0.01 }} }}, translation = [3, 0, 0] }},
+            {{ name = "arm", kind = "dynamic", mass = 1.0, shape = {{ ball = {{ radius = 0.1 }} }}, translation = [3, 0, 0], collides = false, can_sleep = false }},
+        ]
+        joint = [{{ between = ["base", "arm"], anchor = [3, 0, 0], kind = {{ revolute = {{ axis = [0, 0, 1] }} }}, multibody = true }}]
+        deformable = [
+            {{ name = "weight", body = {{ {lattice} }} }}, {material} }},
+            {{ name = "room", body = {{ {lattice}, hollows = [{{ min = [-0.03, -0.03, -0.03], max = [0.03, 0.03, 0.03] }}] }} }}, translation = [1, 0, 0], pinned = [{{ min = [0, -1, -1], max = [2, -0.049, 1] }}], {material} }},
+        ]
+        cable = [{{ name = "hoist", points = [{{ of = "weight", at = [0, 0.0499, 0] }}, {{ at = [0, 1, 0] }}], speed = 10.0 }}]
+        actuator = [
+            {{ name = "lift", drives = "length", of = "hoist", range = [0.2, 0.9501], rate = 0.1, start = 0.9501, then = [{{ at = 0.5, value = 0.85 }}] }},
+            {{ name = "air", drives = "pressure", of = "room", range = [0, 5000], rate = 5000, then = [{{ at = 0.0, value = 1e9 }}] }},
+            {{ name = "turn", drives = "position", between = ["base", "arm"], stiffness = 1000, damping = 100, range = [-1, 1], then = [{{ at = 0.0, value = 0.5 }}] }},
+        ]
+        measure = [
+            {{ name = "start", quantity = "y", of = "weight", at = 0.5 }},
+            {{ name = "y", quantity = "y", of = "weight" }},
+            {{ name = "tension", quantity = "cable_tension", of = "hoist" }},
+            {{ name = "length", quantity = "cable_length", of = "hoist" }},
+            {{ name = "pressure", quantity = "cavity_pressure", of = "room" }},
+            {{ name = "air", quantity = "signal", of = "air" }},
+            {{ name = "tilt", quantity = "tilt", of = "arm" }},
+        ]
+        "#
+    )
+}
+
+#[test]
+fn signals_lead_what_they_drive() {
+    let run = outcome(&scene());
+    let of = |name: &str| number(&run, name);
+    assert!((of("y") - of("start") - 0.1001).abs() < 1e-3, "{} {}", of("start"), of("y"));
+    assert!((of("tension") - 9.81).abs() < 0.01, "{}", of("tension"));
+    assert!((of("length") - 0.85).abs() < 1e-5, "{}", of("length"));
+    assert_eq!((of("air"), of("pressure")), (5000.0, 5000.0));
+    assert!((of("tilt") - 0.5f64.to_degrees()).abs() < 0.5, "{}", of("tilt"));
+}
+
+#[test]
+fn cables_and_signals_that_cannot_be_are_refused_by_name() {
+    let refusals = [
+        ("of = \"hoist\", range", "of = \"host\", range", "\"host\""),
+        ("of = \"room\", range", "of = \"base\", range", "a deformable"),
+        ("drives = \"length\", of = \"hoist\"", "drives = \"length\"", "it needs `of`, a cable"),
+        ("{ of = \"weight\", at", "{ of = \"base\", at", "`of` a deformable"),
+        ("speed = 10.0", "length = 1.0, tension = 2.0", "not both"),
+        ("between = [\"base\", \"arm\"], stiffness", "between = [\"arm\", \"arm\"], stiffness", "no joint"),
+        ("quantity = \"signal\", of = \"air\"", "quantity = \"signal\", of = \"hoist\"", "an actuator"),
+        ("{ at = 0.5, value", "{ at = -0.5, value", "must not be negative"),
+        ("name = \"lift\"", "name = \"hoist\"", "is taken"),
+    ];
+    for (good, bad, what) in refusals {
+        let text = scene().replacen(good, bad, 1);
+        assert_ne!(text, scene(), "{good}");
+        let said = foible_cli::scene::parse(&text).map(|_| ()).unwrap_err().to_string();
+        assert!(said.contains(what), "{said}");
+    }
+    // What only the world knows is said when it is made.
+    let text = scene().replacen("range = [0, 5000]", "range = [5000, 0]", 1);
+    let run = foible_cli::run::run(&common::scene(&text), &Default::default());
+    assert!(run.outcome.error.unwrap().contains("signal \"air\""));
+}
