@@ -20,6 +20,7 @@
 pub mod baseline;
 #[cfg(feature = "command")]
 pub mod command;
+pub mod fit;
 pub mod picture;
 pub mod report;
 pub mod run;

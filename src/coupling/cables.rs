@@ -5,8 +5,8 @@ use super::attachments::SteppedBodies;
 use super::parts::StepContext;
 use super::scene::RapierScene;
 use crate::body::{
-    CablePart, CableRow, ConstraintKey, DeformableBody, DeformableBodySet, DeformableCable,
-    DeformableCableHandle, Guide, Winch,
+    CablePart, CableRow, ConstraintKey, DeformableBodySet, DeformableCable, DeformableCableHandle, Guide,
+    Winch,
 };
 use crate::contact::{Constraint, Endpoint, Law, PathPoint, ProxyId};
 use crate::math::{Pose64, Vec3, tangents};
@@ -15,10 +15,6 @@ use crate::math::{Pose64, Vec3, tangents};
 /// light would be thrown past the points that it is drawn to. 1 kN on a finger of 48 g at 1e3 Pa made 31 times the energy that
 /// it can without the bound, in steps of 1 ms; at half and at twice of it, none.
 const MOST_SHORTENING: f64 = 0.25;
-
-/// Part of a point's own stiffness up to which that of a cable across itself is left to the next step, which then finds so much of
-/// it undone. A finger with 12 guides takes 1.5 times as long with it in the solve; from 1 on, what is left would grow.
-const LAGGING: f64 = 0.1;
 
 /// A cable in a step.
 struct Path<'a> {
@@ -30,8 +26,6 @@ struct Path<'a> {
     points: Vec<Vec<(Endpoint, f64)>>,
     /// Lengths and unit directions of the parts between the points.
     parts: Vec<(f64, Vec3)>,
-    /// What each point resists by itself, about [N/m]; infinite of what does not yield.
-    stiffness: Vec<f64>,
 }
 
 /// Adds the constraints of all cables whose bodies are stepped.
@@ -59,29 +53,16 @@ pub(crate) fn cable_constraints(
         }
         let parts: Vec<_> = points.windows(2).map(|w| part(&w[0], &w[1])).collect();
         let length = parts.iter().map(|(length, _)| length).sum();
-        let stiffness = cable.route.iter().map(|guide| stiffness(guide, deformables)).collect();
         let ends = ends(cable, &points, scene, context, stepped);
         let Some(cable) = deformables.cable_mut(handle) else { continue };
         cable.points = points;
         let winch = cable.wind(length, context.h);
-        let path = Path { handle, cable, idle, points: ends, parts, stiffness };
+        let path = Path { handle, cable, idle, points: ends, parts };
         path.add_pull(length, winch, constraints);
         path.add_friction(constraints);
         path.add_across(constraints);
         cable.reset();
     }
-}
-
-/// Of a point inside of a solid, a cell of it; sheets, ropes and rigid bodies may be as light as they like.
-fn stiffness(guide: &Guide, deformables: &DeformableBodySet) -> f64 {
-    let body = match guide {
-        Guide::World(_) => return f64::INFINITY,
-        Guide::Rigid(..) => return 0.0,
-        Guide::Soft(body, ..) => deformables.get(*body).filter(|body| body.model.is_solid()),
-    };
-    let softest =
-        |body: &DeformableBody| body.materials.iter().map(|m| m.youngs_modulus).fold(f64::INFINITY, f64::min);
-    body.map_or(0.0, |body| softest(body) * body.model.surface.mean_edge)
 }
 
 fn part(from: &Vec3, to: &Vec3) -> (f64, Vec3) {
@@ -165,12 +146,12 @@ impl Path<'_> {
     }
 
     /// A part that is drawn aside pulls back with its tension over its length. Left to the next step, that throws about whatever
-    /// is lighter than h² times as much.
+    /// is lighter than h² times as much, and keeps a slender finger moving for ever, however stiff its cells are: it gives way as a
+    /// whole.
     fn add_across(&self, constraints: &mut Vec<Constraint>) {
         for (part, (length, direction)) in self.parts.iter().enumerate() {
             let tension = self.cable.tensions[part];
-            let least = self.stiffness[part].min(self.stiffness[part + 1]);
-            if !(*length > 0.0 && tension > LAGGING * least * length) {
+            if !(tension > 0.0 && *length > 0.0) {
                 continue;
             }
             for (axis, across) in tangents(direction).into_iter().enumerate() {

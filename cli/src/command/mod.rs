@@ -11,6 +11,7 @@ macro_rules! say {
 mod bless;
 mod check;
 mod drifts;
+mod fit;
 mod new;
 mod progress;
 mod replay;
@@ -48,6 +49,7 @@ const EXAMPLES: &str = "Examples:
   foible check drop.toml                 what is wrong with it, without running
   foible run drop.toml                   verdicts, a trace, a page with a replay
   foible sweep drop.toml --jobs 4        every case of its [sweep]
+  foible fit press.toml                  parameters of its [fit], from what was recorded
   foible bless drop.toml                 what it comes to now is right
 
 Exit codes: 0 all is met, 1 an expectation failed or a baseline has moved, 2 a file or an argument is wrong, 130 stopped by Ctrl-C.";
@@ -60,6 +62,8 @@ enum Command {
     Check(check::Check),
     /// Runs every case of a scene's [sweep], several side by side; cases that are finished are not run again.
     Sweep(sweep::Sweep),
+    /// Finds the parameters of a scene's [fit] that bring it nearest to what was recorded.
+    Fit(fit::Fit),
     /// Writes reports of results that are there, without running.
     Report(report::Report),
     /// Writes what scenes come to now as their baseline, with which later runs are compared.
@@ -105,6 +109,7 @@ pub fn main() -> ExitCode {
         Command::Run(run) => run.main(),
         Command::Check(check) => check.main(),
         Command::Sweep(sweep) => sweep.main(),
+        Command::Fit(fit) => fit.main(),
         Command::Report(report) => report.main(),
         Command::Bless(bless) => bless.main(),
         Command::Replay(replay) => replay.main(),

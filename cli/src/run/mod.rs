@@ -41,6 +41,8 @@ pub struct Run {
     pub trace: Trace,
     /// What it looked like, if it was asked for.
     pub replay: Option<Replay>,
+    /// Of every expectation with `equals` or a curve, what it is off by in its tolerances: one number, or one a step.
+    pub residuals: Vec<f64>,
     /// Whether it was stopped before its end.
     pub is_stopped: bool,
 }
@@ -63,7 +65,8 @@ pub struct Run {
 pub fn run(file: &SceneFile, options: &RunOptions<'_>) -> Run {
     let (_, dt) = file.scene.steps();
     let outcome = Outcome { scene: file.name.clone(), key: key(file), dt, ..Outcome::default() };
-    let mut run = Run { outcome, trace: Trace::default(), replay: None, is_stopped: false };
+    let mut run =
+        Run { outcome, trace: Trace::default(), replay: None, residuals: Vec::new(), is_stopped: false };
     let made = stage::build(&file.scene, &file.folder).and_then(|stage| Ok((stage, curves(file)?)));
     match made {
         Ok((mut stage, curves)) => steps(file, &mut stage, &curves, options, &mut run),
@@ -116,6 +119,7 @@ fn steps(
         stage.pull_triggers(scene, time);
     }
     judge(scene, stage, &signals, curves, &mut run.outcome);
+    run.residuals = residuals(scene, &signals, curves, dt);
 }
 
 /// Numbers and verdicts of a run that has ended.
@@ -153,6 +157,23 @@ fn judge(
         }
     }
     outcome.finals = finals(scene, stage);
+}
+
+/// What expectations with `equals` or a curve are off by, in their tolerances.
+fn residuals(scene: &Scene, signals: &Signals, curves: &[Option<Recorded>], dt: f64) -> Vec<f64> {
+    let mut all = Vec::new();
+    for (e, curve) in scene.expect.iter().zip(curves) {
+        let (series, within) = (signals.series(e), e.within.unwrap_or(1.0));
+        match (curve, e.equals) {
+            (Some(curve), _) => {
+                let window = signals.window(e, series.len());
+                all.extend(curve.distances(&series, window, dt).map(|off| off / within));
+            }
+            (None, Some(equals)) => all.push((signals.take(e, &series) - equals) / within),
+            (None, None) => {}
+        }
+    }
+    all
 }
 
 /// Names that were there before get a number behind them.

@@ -45,9 +45,20 @@ impl Recorded {
         Some(v0 + (v1 - v0) * ((time - t0) / (t1 - t0)).clamp(0.0, 1.0))
     }
 
+    /// What values are above it, where it is.
+    pub fn distances<'a>(
+        &'a self,
+        series: &'a [f64],
+        window: std::ops::Range<usize>,
+        dt: f64,
+    ) -> impl Iterator<Item = f64> + 'a {
+        window.filter_map(move |k| Some(series[k] - self.at((k + 1) as f64 * dt)?))
+    }
+
     /// The largest distance of values from it, where it is; NaN if it is nowhere.
     pub fn farthest(&self, series: &[f64], window: std::ops::Range<usize>, dt: f64) -> f64 {
-        let distances = window.filter_map(|k| Some((series[k] - self.at((k + 1) as f64 * dt)?).abs()));
-        distances.fold(f64::NAN, |a, d| if d.is_nan() { f64::INFINITY } else { a.max(d) })
+        self.distances(series, window, dt)
+            .map(f64::abs)
+            .fold(f64::NAN, |a, d| if d.is_nan() { f64::INFINITY } else { a.max(d) })
     }
 }

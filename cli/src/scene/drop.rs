@@ -48,6 +48,34 @@ pub struct Sweep {
     pub over: BTreeMap<String, Axis>,
 }
 
+/// Parameters to find, so that expectations with `equals` or `curve` are met best.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Fit {
+    /// Parameters, or dotted paths as of a sweep, and where they are looked for.
+    pub over: BTreeMap<String, FitRange>,
+    /// Runs that the search may take, about.
+    #[serde(default = "fit_runs")]
+    pub runs: u64,
+}
+
+fn fit_runs() -> u64 {
+    200
+}
+
+/// Where a parameter is looked for.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FitRange {
+    /// One end.
+    pub from: f64,
+    /// The other.
+    pub to: f64,
+    /// By differences, or by ratios: for what may be a tenth or ten times as much.
+    #[serde(default)]
+    pub scale: Scale,
+}
+
 /// How the values of several axes go together.
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]

@@ -19,7 +19,7 @@ pub use deformable::{
     Body, Deformable, Elasticity, Fidelity, Filling, Frames, Integrator, Material, Region, RegionMaterial,
     Regions, Solver, SolverKind, System,
 };
-pub use drop::{Axis, Drop, Entry, Mode, Orientations, Random, Range, Scale, Sweep};
+pub use drop::{Axis, Drop, Entry, Fit, FitRange, Mode, Orientations, Random, Range, Scale, Sweep};
 pub use expectation::{Curve, Expect, Holds, Probe, Quantity, Take};
 pub use mistake::SceneError;
 pub use rigid::{Joint, JointKind, Kind, Motor, Part, Rigid, Shape, Switch};
@@ -86,6 +86,8 @@ pub struct Scene {
     pub expect: Vec<Expect>,
     /// Cases that `foible sweep` runs.
     pub sweep: Option<Sweep>,
+    /// Parameters that `foible fit` finds.
+    pub fit: Option<Fit>,
 }
 
 impl Scene {

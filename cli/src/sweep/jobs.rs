@@ -154,7 +154,7 @@ fn broken(job: &Job, panic: &(dyn std::any::Any + Send)) -> Run {
     let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
     let error = Some(format!("broke off: {}", text.unwrap_or("for an unknown reason")));
     let outcome = Outcome { scene: job.file.name.clone(), key: key(&job.file), error, ..Outcome::default() };
-    Run { outcome, trace: Default::default(), replay: None, is_stopped: false }
+    Run { outcome, trace: Default::default(), replay: None, residuals: Vec::new(), is_stopped: false }
 }
 
 /// The results of an earlier run of the same scene.
