@@ -59,7 +59,8 @@ def test_the_stub_tells_the_arguments():
         for child in node.body:
             if not isinstance(child, ast.FunctionDef) or child.name.startswith("__") or child.decorator_list:
                 continue
-            told = [argument.arg for argument in child.args.args + child.args.kwonlyargs]
+            rest = [child.args.vararg] if child.args.vararg else []
+            told = [argument.arg for argument in child.args.args + rest + child.args.kwonlyargs]
             signature = inspect.signature(getattr(getattr(foible3d, node.name), child.name))
             found = [name for name, p in signature.parameters.items() if p.kind != p.VAR_KEYWORD]
             assert told == found, f"{node.name}.{child.name}"
