@@ -7,7 +7,7 @@
 //! | `world`, `snapshots`, `counters`, `batch` | the world, its bytes, what a step did, many worlds |
 //! | `bodies`, `sets` | putting things in and out, and finding them |
 //! | `rigid*`, `collider*`, `joint*` | rapier's |
-//! | `material`, `deformable*`, `attachments`, `cables`, `contacts` | foible3d's |
+//! | `material`, `deformable*`, `attachments`, `cables`, `contacts`, `events` | foible3d's |
 //! | `wind`, `queries`, `recording` | air, rays, files |
 //! | `tactile`, `depth_camera`, `wrench` | touch, as sensors report it |
 //! | `actuators`, `signals` | what drives a world, by name |
@@ -31,6 +31,7 @@ mod deformable_shapes;
 mod depth_camera;
 mod enums;
 mod errors;
+mod events;
 mod handles;
 mod joint_builder;
 mod joints;
@@ -75,6 +76,8 @@ mod native {
         PyBodyType, PyCombineRule, PyElasticity, PyFidelity, PyGroups, PyIntegrator, PyJointAxis,
         PyMotorModel,
     };
+    #[pymodule_export]
+    use crate::events::{PyCollisionEvent, PyContactForceEvent};
     #[pymodule_export]
     use crate::handles::{
         PyAttachmentHandle, PyCableHandle, PyColliderHandle, PyDeformableHandle, PyJointHandle,
