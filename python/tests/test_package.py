@@ -1,6 +1,7 @@
 """The package itself: docstrings, stubs, and the lines of the README."""
 
 import ast
+import importlib.util
 import inspect
 import pathlib
 import re
@@ -78,9 +79,13 @@ def test_options_are_the_methods_of_their_builders():
         assert stub_members(classes[options], classes) == set(public(getattr(foible3d, builder))), builder
 
 
-def test_the_lines_of_the_readme_run():
+def test_the_lines_of_the_readme_run(tmp_path, monkeypatch):
+    # Where files are written.
+    monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```python\n(.*?)```", README.read_text(), re.S)
     assert blocks
     names = {}
     for block in blocks:
+        if "import gymnasium" in block and importlib.util.find_spec("gymnasium") is None:
+            continue
         exec(compile(block, str(README), "exec"), names)
