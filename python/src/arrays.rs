@@ -1,7 +1,7 @@
 //! Numbers from Python and back: vectors, poses, arrays of points and of indices, each checked and named.
 
 use crate::errors::bad_value;
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use rapier3d::math::{Pose, Rotation, Vector};
@@ -110,6 +110,20 @@ pub fn rows<'py, T: numpy::Element, const N: usize>(
 ) -> PyResult<Bound<'py, PyArray2<T>>> {
     let count = rows.len();
     PyArray1::from_vec(py, rows.into_iter().flatten().collect()).reshape([count, N])
+}
+
+/// A grid for Python: an array of shape (rows, columns, `N`), of numbers row by row.
+pub fn grid<'py, const N: usize>(
+    py: Python<'py>,
+    [rows, columns]: [usize; 2],
+    values: &[[f64; N]],
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    PyArray1::from_slice(py, values.as_flattened()).reshape([rows, columns, N])
+}
+
+/// An image for Python: an array of shape (rows, columns), of numbers row by row.
+pub fn image<'py>(py: Python<'py>, [rows, columns]: [usize; 2], values: Vec<f64>) -> PyResult<Array2<'py>> {
+    PyArray1::from_vec(py, values).reshape([rows, columns])
 }
 
 /// A number that is finite and, if it is to be, positive.

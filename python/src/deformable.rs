@@ -57,7 +57,8 @@ impl PyDeformableBody {
         self.with(py, |body| work(body).map_err(Failure::from))?.map_err(PyErr::from)
     }
 
-    fn in_world<R>(&self, py: Python<'_>, work: impl FnOnce(&mut Inner) -> R) -> PyResult<R> {
+    /// Does something with the world of the body.
+    pub fn in_world<R>(&self, py: Python<'_>, work: impl FnOnce(&mut Inner) -> R) -> PyResult<R> {
         self.world.get().with(py, work)
     }
 }

@@ -25,7 +25,7 @@ pub struct PyDeformableBuilder {
 type Change = Arc<dyn Fn(DeformableBodyBuilder) -> DeformableBodyBuilder + Send + Sync>;
 
 /// The methods that take several arguments, as options.
-pub const SPREAD: [&str; 1] = ["region_material"];
+pub const SPREAD: [&str; 2] = ["active_events", "region_material"];
 
 impl PyDeformableBuilder {
     /// Of a model.
@@ -38,7 +38,8 @@ impl PyDeformableBuilder {
         Self { model: self.model.clone(), changes: self.changes.clone(), pinned }
     }
 
-    fn new_with(
+    /// One with something more set on it.
+    pub fn new_with(
         &self,
         py: Python<'_>,
         change: impl Fn(DeformableBodyBuilder) -> DeformableBodyBuilder + Send + Sync + 'static,

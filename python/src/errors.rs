@@ -1,6 +1,6 @@
 //! Exceptions, and what becomes one.
 
-use foible3d::{DeformableBodyError, HandleError};
+use foible3d::{ActuatorError, DeformableBodyError, HandleError};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -10,6 +10,7 @@ pub mod exceptions {
     pyo3::import_exception!(foible3d._errors, DeformableBodyError);
     pyo3::import_exception!(foible3d._errors, InvalidHandle);
     pyo3::import_exception!(foible3d._errors, SnapshotError);
+    pyo3::import_exception!(foible3d._errors, UnknownSignal);
 }
 
 /// An error of the crate on its way to Python: what names no body becomes an `InvalidHandle`, all else a
@@ -36,6 +37,14 @@ impl From<Failure> for PyErr {
 /// Turns any of the crate's errors into an exception.
 pub fn raised(error: impl Into<DeformableBodyError>) -> PyErr {
     Failure(error.into()).into()
+}
+
+/// Turns an error of a signal into an exception: `UnknownSignal`, or a `DeformableBodyError`.
+pub fn bad_signal(error: &ActuatorError) -> PyErr {
+    match error {
+        ActuatorError::Unknown { .. } => exceptions::UnknownSignal::new_err(error.to_string()),
+        _ => bad_value(error.to_string()),
+    }
 }
 
 /// What a handle that names nothing raises, in the words of the crate.

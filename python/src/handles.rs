@@ -1,6 +1,6 @@
 //! Names of what a world holds: plain values, which stay good when a world is saved and loaded.
 
-use foible3d::{DeformableAttachmentHandle, DeformableBodyHandle};
+use foible3d::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableCableHandle};
 use pyo3::prelude::*;
 use rapier3d::dynamics::{ImpulseJointHandle, RigidBodyHandle};
 use rapier3d::geometry::ColliderHandle;
@@ -71,38 +71,45 @@ handle!(
     DeformableBodyHandle
 );
 
-/// Names an attachment of a world; never used again after its removal.
-///
-/// Handles can be compared, hashed and pickled, and name the same things in a copy of the world.
-#[pyclass(frozen, eq, hash, from_py_object, name = "AttachmentHandle", module = "foible3d")]
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-pub struct PyAttachmentHandle(pub DeformableAttachmentHandle);
+macro_rules! numbered {
+    ($name:ident, $python:literal, $kind:literal, $of:ty) => {
+        #[doc = concat!("Names ", $kind, " of a world; never used again after its removal.")]
+        #[doc = ""]
+        #[doc = "Handles can be compared, hashed and pickled, and name the same things in a copy of the world."]
+        #[pyclass(frozen, eq, hash, from_py_object, name = $python, module = "foible3d")]
+        #[derive(Clone, Copy, PartialEq, Eq, Hash)]
+        pub struct $name(pub $of);
 
-#[pymethods]
-impl PyAttachmentHandle {
-    /// The handle of this number.
-    #[new]
-    fn new(id: u64) -> PyResult<Self> {
-        // The crate has no way to a handle from its number but serde's.
-        let bytes = postcard::to_stdvec(&id).map_err(internal)?;
-        postcard::from_bytes(&bytes).map(Self).map_err(internal)
-    }
+        #[pymethods]
+        impl $name {
+            /// The handle of this number.
+            #[new]
+            fn new(id: u64) -> PyResult<Self> {
+                // The crate has no way to a handle from its number but serde's.
+                let bytes = postcard::to_stdvec(&id).map_err(internal)?;
+                postcard::from_bytes(&bytes).map(Self).map_err(internal)
+            }
 
-    /// Its number: how many attachments were made before.
-    #[getter]
-    pub fn id(&self) -> PyResult<u64> {
-        let bytes = postcard::to_stdvec(&self.0).map_err(internal)?;
-        postcard::from_bytes(&bytes).map_err(internal)
-    }
+            /// Its number: how many of its kind were made before.
+            #[getter]
+            pub fn id(&self) -> PyResult<u64> {
+                let bytes = postcard::to_stdvec(&self.0).map_err(internal)?;
+                postcard::from_bytes(&bytes).map_err(internal)
+            }
 
-    fn __repr__(&self) -> PyResult<String> {
-        Ok(format!("AttachmentHandle(id={})", self.id()?))
-    }
+            fn __repr__(&self) -> PyResult<String> {
+                Ok(format!(concat!($python, "(id={})"), self.id()?))
+            }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (u64,))> {
-        Ok((slf.get_type().into_any(), (slf.get().id()?,)))
-    }
+            fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (u64,))> {
+                Ok((slf.get_type().into_any(), (slf.get().id()?,)))
+            }
+        }
+    };
 }
+
+numbered!(PyAttachmentHandle, "AttachmentHandle", "an attachment", DeformableAttachmentHandle);
+numbered!(PyCableHandle, "CableHandle", "a cable", DeformableCableHandle);
 
 fn internal(error: postcard::Error) -> PyErr {
     pyo3::exceptions::PyRuntimeError::new_err(error.to_string())

@@ -7,12 +7,17 @@
 //! | `world`, `snapshots`, `counters`, `batch` | the world, its bytes, what a step did, many worlds |
 //! | `bodies`, `sets` | putting things in and out, and finding them |
 //! | `rigid*`, `collider*`, `joint*` | rapier's |
-//! | `material`, `deformable*`, `attachments`, `contacts` | foible3d's |
+//! | `material`, `deformable*`, `attachments`, `cables`, `contacts`, `events` | foible3d's |
+//! | `wind`, `queries`, `recording` | air, rays, files |
+//! | `tactile`, `depth_camera`, `wrench` | touch, as sensors report it |
+//! | `actuators`, `signals` | what drives a world, by name |
 
+mod actuators;
 mod arrays;
 mod attachments;
 mod batch;
 mod bodies;
+mod cables;
 mod collider;
 mod collider_builder;
 mod contacts;
@@ -23,27 +28,39 @@ mod deformable_cavities;
 mod deformable_controls;
 mod deformable_forces;
 mod deformable_shapes;
+mod depth_camera;
 mod enums;
 mod errors;
+mod events;
 mod handles;
 mod joint_builder;
 mod joints;
 mod material;
 mod options;
+mod queries;
+mod recording;
 mod rigid;
 mod rigid_builder;
 mod rigid_forces;
 mod sets;
+mod signals;
 mod snapshots;
+mod tactile;
+mod wind;
 mod world;
+mod wrench;
 
 /// The compiled part of foible3d; import from ``foible3d``.
 #[pyo3::pymodule(name = "_native")]
 mod native {
     #[pymodule_export]
+    use crate::actuators::{ActuatorSet, PySignal};
+    #[pymodule_export]
     use crate::attachments::Attachment;
     #[pymodule_export]
     use crate::batch::step_all;
+    #[pymodule_export]
+    use crate::cables::{Cable, PyCablePoint};
     #[pymodule_export]
     use crate::collider::PyCollider;
     #[pymodule_export]
@@ -53,13 +70,18 @@ mod native {
     #[pymodule_export]
     use crate::deformable_builder::PyDeformableBuilder;
     #[pymodule_export]
+    use crate::depth_camera::PyDepthCamera;
+    #[pymodule_export]
     use crate::enums::{
         PyBodyType, PyCombineRule, PyElasticity, PyFidelity, PyGroups, PyIntegrator, PyJointAxis,
         PyMotorModel,
     };
     #[pymodule_export]
+    use crate::events::{PyCollisionEvent, PyContactForceEvent};
+    #[pymodule_export]
     use crate::handles::{
-        PyAttachmentHandle, PyColliderHandle, PyDeformableHandle, PyJointHandle, PyRigidBodyHandle,
+        PyAttachmentHandle, PyCableHandle, PyColliderHandle, PyDeformableHandle, PyJointHandle,
+        PyRigidBodyHandle,
     };
     #[pymodule_export]
     use crate::joint_builder::{FixedJoint, PrismaticJoint, PyJointBuilder, RevoluteJoint, SphericalJoint};
@@ -68,11 +90,19 @@ mod native {
     #[pymodule_export]
     use crate::material::PyMaterial;
     #[pymodule_export]
+    use crate::queries::PySurfacePoint;
+    #[pymodule_export]
     use crate::rigid::PyRigidBody;
     #[pymodule_export]
     use crate::rigid_builder::PyRigidBodyBuilder;
     #[pymodule_export]
-    use crate::sets::{AttachmentSet, ColliderSet, DeformableBodySet, ImpulseJointSet, RigidBodySet};
+    use crate::sets::{
+        AttachmentSet, CableSet, ColliderSet, DeformableBodySet, ImpulseJointSet, RigidBodySet,
+    };
+    #[pymodule_export]
+    use crate::signals::{PyActuator, PyMotorAxis};
+    #[pymodule_export]
+    use crate::tactile::{PyTactilePad, PyTactileReading};
     #[pymodule_export]
     use crate::world::World;
 

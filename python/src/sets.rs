@@ -1,11 +1,13 @@
 //! What a world holds, by handles.
 
+use crate::actuators::ActuatorSet;
 use crate::attachments::Attachment;
+use crate::cables::Cable;
 use crate::collider::PyCollider;
 use crate::deformable::PyDeformableBody;
 use crate::errors::no_such;
 use crate::handles::{
-    PyAttachmentHandle, PyColliderHandle, PyDeformableHandle, PyJointHandle, PyRigidBodyHandle,
+    PyAttachmentHandle, PyCableHandle, PyColliderHandle, PyDeformableHandle, PyJointHandle, PyRigidBodyHandle,
 };
 use crate::joints::PyJoint;
 use crate::rigid::PyRigidBody;
@@ -101,6 +103,14 @@ set! {
     |handle| (handle.id().unwrap_or(u64::MAX) as u32, 0)
 }
 
+set! {
+    /// The cables of a world, oldest first.
+    CableSet = "CableSet", PyCableHandle, Cable, "cable",
+    |inner, handle| inner.deformables.bodies.cable(handle.0).is_some(),
+    |inner| inner.deformables.bodies.cables().map(|(handle, _)| PyCableHandle(handle)).collect(),
+    |handle| (handle.id().unwrap_or(u64::MAX) as u32, 0)
+}
+
 #[pymethods]
 impl World {
     /// The rigid bodies, by handles.
@@ -131,5 +141,17 @@ impl World {
     #[getter]
     fn attachments(slf: Bound<'_, Self>) -> AttachmentSet {
         AttachmentSet(slf.unbind())
+    }
+
+    /// The cables, by handles.
+    #[getter]
+    fn cables(slf: Bound<'_, Self>) -> CableSet {
+        CableSet(slf.unbind())
+    }
+
+    /// The signals that drive the world, by name.
+    #[getter]
+    fn actuators(slf: Bound<'_, Self>) -> ActuatorSet {
+        ActuatorSet(slf.unbind())
     }
 }

@@ -6,6 +6,17 @@ import pytest
 import foible3d as f
 
 
+def pytest_addoption(parser):
+    parser.addoption("--runslow", action="store_true", help="run tests that take a minute")
+
+
+def pytest_collection_modifyitems(config, items):
+    if not config.getoption("--runslow"):
+        for item in items:
+            if "slow" in item.keywords:
+                item.add_marker(pytest.mark.skip(reason="takes a minute: --runslow"))
+
+
 class Scene:
     """A world with a floor whose top is at y = 0."""
 

@@ -12,9 +12,15 @@ class InvalidHandle(KeyError):
     __str__ = Exception.__str__
 
 
+class UnknownSignal(KeyError):
+    """A name that no signal of the world has."""
+
+    __str__ = Exception.__str__
+
+
 class SnapshotError(ValueError):
     """Bytes that are no snapshot of a world, damaged, or of another version."""
 
 
-for _class in (DeformableBodyError, InvalidHandle, SnapshotError):
+for _class in (DeformableBodyError, InvalidHandle, UnknownSignal, SnapshotError):
     _class.__module__ = "foible3d"
