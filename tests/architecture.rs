@@ -30,8 +30,17 @@ const SOLVER: [&[&str]; 7] =
     [&["counters"], &["linear"], &["body_step"], &["acceleration"], &["cone"], &["constraints"], &["island"]];
 
 /// Within the command's package, from the ground up.
-const CLI: [&[&str]; 8] =
-    [&["scene"], &["stage"], &["run"], &["sweep"], &["baseline"], &["picture"], &["report"], &["command"]];
+const CLI: [&[&str]; 9] = [
+    &["scene"],
+    &["stage"],
+    &["run"],
+    &["sweep"],
+    &["fit"],
+    &["baseline"],
+    &["picture"],
+    &["report"],
+    &["command"],
+];
 
 /// Lines of a file, and of a function, at the most.
 const LONGEST_FILE: usize = 400;

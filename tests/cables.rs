@@ -2,19 +2,13 @@
 
 mod common;
 
-use common::{G, at_rest_where, mean_position, total_energy, world_with_floor};
+use common::cables::{finger, steps, world};
+use common::{G, at_rest_where, mean_position, world_with_floor};
 use foible3d::BodyError;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 
 const H: f32 = 1.0 / 60.0;
-
-fn world(gravity: Vector) -> (PhysicsWorld, DeformableWorld) {
-    let mut physics = PhysicsWorld::new();
-    physics.gravity = gravity;
-    physics.integration_parameters.dt = H;
-    (physics, DeformableWorld::new())
-}
 
 /// A cube of 10 cm and 1 kg whose centre is at a place.
 fn weight(at: Vector) -> DeformableBodyBuilder {
@@ -37,35 +31,6 @@ fn top(body: &DeformableBody) -> usize {
             off(a).total_cmp(&off(b))
         })
         .unwrap()
-}
-
-fn steps(physics: &mut PhysicsWorld, deformables: &mut DeformableWorld, count: usize) {
-    (0..count).for_each(|_| deformables.step(physics));
-}
-
-/// A finger along x from 0 to `length`, held at x = 0, `2 half` thick, with a tendon `offset` below its axis that is drawn at the base.
-fn finger(
-    deformables: &mut DeformableWorld,
-    young: f64,
-    [length, half, offset]: [f32; 3],
-    cells: [usize; 3],
-    cable: impl FnOnce(DeformableCableBuilder) -> DeformableCableBuilder,
-) -> (DeformableBodyHandle, DeformableCableHandle) {
-    let body = DeformableBodyBuilder::cuboid(Vector::new(0.5 * length, half, half), cells)
-        .translation(Vector::X * 0.5 * length)
-        .material(DeformableMaterial::new(young, 0.0).density(1000.0).mass_damping(20.0))
-        .smoothed()
-        .can_sleep(false);
-    let body = deformables.insert(body).unwrap();
-    let base = deformables.bodies[body].vertices_where(|x| x.x < 1e-6);
-    base.iter().for_each(|v| deformables.bodies[body].pin(*v).unwrap());
-    let guides = 12;
-    let at = |k: usize| {
-        let x = length * (k as f32 / guides as f32).clamp(1.0e-5, 1.0 - 1.0e-5);
-        CablePoint::Inside(body, Vector::new(x, -offset, 0.0))
-    };
-    let tendon = cable(DeformableCableBuilder::new((0..=guides).rev().map(at)));
-    (body, deformables.bodies.insert_cable(tendon).unwrap())
 }
 
 #[test]
@@ -263,99 +228,6 @@ fn slack_cables_do_nothing_and_catch() {
     steps(&mut physics, &mut deformables, 300);
     let length = deformables.bodies.cable_length(cable, &physics.bodies);
     assert!((length - 2.0).abs() < 1e-5, "{length}");
-}
-
-#[test]
-fn all_ways_of_solving_come_to_the_same_bend() {
-    let run = |settings: &dyn Fn(&mut DeformableBody)| {
-        let (mut physics, mut deformables) = world(Vector::ZERO);
-        let (finger, _) =
-            finger(&mut deformables, 1.0e6, [0.12, 0.01, 0.006], [12, 4, 4], |c| c.tension(2.0));
-        settings(&mut deformables.bodies[finger]);
-        steps(&mut physics, &mut deformables, 300);
-        let body = &deformables.bodies[finger];
-        mean_position(body, &at_rest_where(body, |x| x[0] > 0.0599))
-    };
-    let with = |change: &dyn Fn(&mut SolverSettings)| {
-        run(&|body| {
-            let mut settings = *body.settings();
-            change(&mut settings);
-            body.set_settings(settings);
-        })
-    };
-    let usual = run(&|_| ());
-    let others = [
-        ("newton", with(&|s| s.solver = Solver::Newton)),
-        ("conjugate gradients", with(&|s| s.solver = Solver::ConjugateGradients)),
-        ("one iteration", with(&|s| s.max_iterations = 1)),
-        ("loose contact forces", with(&|s| s.contact_tolerance = 1.0e-2)),
-    ];
-    for (name, tip) in others {
-        let off = (0..3).map(|k| (tip[k] - usual[k]).abs()).fold(0.0, f64::max);
-        println!("{name}: {off:e} m");
-        assert!(off < 1e-5, "{name}: {off}");
-    }
-}
-
-#[test]
-fn tendons_on_both_sides_of_a_slender_finger_come_to_rest() {
-    // It bends by 3 E I/l³ = 12 N/m, a five hundredth of what one of its cells resists.
-    for dt in [1.0 / 60.0, 1.0 / 240.0] {
-        let (mut physics, mut deformables) = world(Vector::ZERO);
-        physics.integration_parameters.dt = dt;
-        let body = DeformableBodyBuilder::cuboid(Vector::new(0.015, 0.06, 0.01), [2, 10, 2])
-            .material(DeformableMaterial::new(5.0e5, 0.4).mass_damping(8.0))
-            .can_sleep(false);
-        let body = deformables.insert(body).unwrap();
-        let base = deformables.bodies[body].vertices_where(|x| x.y < -0.0599);
-        base.iter().for_each(|v| deformables.bodies[body].pin(*v).unwrap());
-        for (x, tension) in [(-0.012, 7.4), (0.012, 11.4)] {
-            let at =
-                |k: usize| CablePoint::Inside(body, Vector::new(x, 0.0598 - 0.1196 * k as f32 / 6.0, 0.0));
-            let cable = DeformableCableBuilder::new((0..=6).map(at)).tension(tension);
-            deformables.bodies.insert_cable(cable).unwrap();
-        }
-        steps(&mut physics, &mut deformables, (4.0 / dt) as usize);
-        let speed = deformables.bodies[body].max_speed();
-        println!("dt {dt}: {speed:e} m/s");
-        // 4 m/s where what is across a cable is left to the next step.
-        assert!(speed < 3e-3, "{speed}");
-    }
-}
-
-#[test]
-fn no_pull_makes_energy_or_nan() {
-    for young in [1.0e3, 1.0e6, 1.0e9] {
-        for dt in [1.0e-3, 1.0 / 60.0, 0.1] {
-            for tension in [1.0e-3, 1.0, 1.0e3, 1.0e6] {
-                for iterations in [1, 10] {
-                    let (mut physics, mut deformables) = world(Vector::ZERO);
-                    physics.integration_parameters.dt = dt;
-                    let (finger, cable) =
-                        finger(&mut deformables, young, [0.12, 0.01, 0.006], [6, 2, 2], |c| {
-                            c.tension(tension)
-                        });
-                    let mut settings = *deformables.bodies[finger].settings();
-                    settings.max_iterations = iterations;
-                    deformables.bodies[finger].set_settings(settings);
-                    let mut worst = 0.0f64;
-                    for _ in 0..40 {
-                        deformables.step(&mut physics);
-                        worst = worst.max(deformables.bodies[finger].kinetic_energy());
-                    }
-                    let body = &deformables.bodies[finger];
-                    let energy = total_energy(body);
-                    // The cable can give no more than its tension along its way.
-                    let given = tension * 0.12;
-                    assert!(
-                        energy.is_finite() && worst <= 1.01 * given,
-                        "{young} {dt} {tension} {iterations}: {worst} {given}"
-                    );
-                    assert!(deformables.bodies.cable(cable).unwrap().tension().is_finite());
-                }
-            }
-        }
-    }
 }
 
 #[test]
