@@ -33,6 +33,50 @@ fn top(body: &DeformableBody) -> usize {
         .unwrap()
 }
 
+/// A weight that hangs on a cable over a guide 3 m above it, and further ones.
+struct Hoist {
+    physics: PhysicsWorld,
+    deformables: DeformableWorld,
+    weight: DeformableBodyHandle,
+    cable: DeformableCableHandle,
+    /// \[N\].
+    load: f64,
+}
+
+impl Hoist {
+    fn new(
+        further: &[Vector],
+        cable: impl FnOnce(DeformableCableBuilder, f64) -> DeformableCableBuilder,
+    ) -> Self {
+        let (physics, mut deformables) = world(Vector::Y * -9.81);
+        let weight = deformables.insert(weight(Vector::ZERO)).unwrap();
+        let body = &deformables.bodies[weight];
+        let (tied, load) = (top(body), body.mass() * G);
+        let guides = [Vector::Y * 3.0].into_iter().chain(further.iter().copied()).map(CablePoint::World);
+        let points = [CablePoint::Vertex(weight, tied)].into_iter().chain(guides);
+        let cable =
+            deformables.bodies.insert_cable(cable(DeformableCableBuilder::new(points), load)).unwrap();
+        Self { physics, deformables, weight, cable, load }
+    }
+
+    fn step(&mut self, count: usize) {
+        steps(&mut self.physics, &mut self.deformables, count);
+    }
+
+    fn cable(&mut self) -> &mut DeformableCable {
+        self.deformables.bodies.cable_mut(self.cable).unwrap()
+    }
+
+    fn height(&self) -> f64 {
+        self.deformables.bodies[self.weight].center_of_mass()[1]
+    }
+
+    fn speed(&self) -> f64 {
+        let body = &self.deformables.bodies[self.weight];
+        body.linear_momentum()[1] / body.mass()
+    }
+}
+
 #[test]
 fn without_friction_there_is_one_tension_through_bodies_links_and_the_world() {
     // A movable pulley: the rigid block hangs in two parts of the cable, the soft weight on a third.
@@ -68,26 +112,16 @@ fn without_friction_there_is_one_tension_through_bodies_links_and_the_world() {
 fn friction_at_guides_is_eulers() {
     // Over two guides, by 90 degrees each; the winch takes in, then lets out.
     for mu in [0.1, 0.5, 1.0] {
-        let (mut physics, mut deformables) = world(Vector::Y * -9.81);
-        let soft = deformables.insert(weight(Vector::ZERO)).unwrap();
-        let body = &deformables.bodies[soft];
-        let (tied, load) = (top(body), body.mass() * G);
-        let points = [
-            CablePoint::Vertex(soft, tied),
-            CablePoint::World(Vector::new(0.0, 3.0, 0.0)),
-            CablePoint::World(Vector::new(1.0, 3.0, 0.0)),
-            CablePoint::World(Vector::new(1.0, 0.0, 0.0)),
-        ];
-        let cable = DeformableCableBuilder::new(points).friction(mu).speed(0.05);
-        let cable = deformables.bodies.insert_cable(cable).unwrap();
-        steps(&mut physics, &mut deformables, 60);
+        let over = [Vector::new(1.0, 3.0, 0.0), Vector::new(1.0, 0.0, 0.0)];
+        let mut hoist = Hoist::new(&over, |cable, _| cable.friction(mu).speed(0.05));
+        hoist.step(60);
+        let load = hoist.load;
         let grows = (mu * std::f64::consts::FRAC_PI_2).exp();
         for (sign, by) in [(-1.0, grows), (1.0, 1.0 / grows)] {
-            let free = deformables.bodies.cable(cable).unwrap().free_length().unwrap();
-            let cable_mut = deformables.bodies.cable_mut(cable).unwrap();
-            cable_mut.set_length(free + sign * 0.5).unwrap();
-            steps(&mut physics, &mut deformables, 300);
-            let tensions = deformables.bodies.cable(cable).unwrap().tensions();
+            let free = hoist.cable().free_length().unwrap();
+            hoist.cable().set_length(free + sign * 0.5).unwrap();
+            hoist.step(300);
+            let tensions = hoist.cable().tensions();
             println!("mu {mu}, {sign}: {:?}", tensions.iter().map(|t| t / load).collect::<Vec<_>>());
             // At 0.05 m/s the damping of 5/s bears a part.
             assert!((tensions[0] / load - 1.0 + sign * 5.0 * 0.05 / G).abs() < 1e-5);
@@ -100,24 +134,16 @@ fn friction_at_guides_is_eulers() {
 #[test]
 fn what_is_held_by_friction_stays() {
     // The winch draws with less than the weight, by less than friction bears: nothing passes the guide.
-    let (mut physics, mut deformables) = world(Vector::Y * -9.81);
-    let soft = deformables.insert(weight(Vector::ZERO)).unwrap();
-    let body = &deformables.bodies[soft];
-    let (tied, load) = (top(body), body.mass() * G);
-    let points = [
-        CablePoint::Vertex(soft, tied),
-        CablePoint::World(Vector::new(0.0, 3.0, 0.0)),
-        CablePoint::World(Vector::new(1.0, 3.0, 0.0)),
-    ];
-    let cable = DeformableCableBuilder::new(points).friction(0.5).tension(load);
-    let cable = deformables.bodies.insert_cable(cable).unwrap();
-    steps(&mut physics, &mut deformables, 60);
-    deformables.bodies.cable_mut(cable).unwrap().set_tension(0.6 * load).unwrap();
-    steps(&mut physics, &mut deformables, 60);
-    let before = deformables.bodies[soft].center_of_mass()[1];
-    steps(&mut physics, &mut deformables, 300);
-    let fallen = before - deformables.bodies[soft].center_of_mass()[1];
-    let tensions = deformables.bodies.cable(cable).unwrap().tensions();
+    let mut hoist =
+        Hoist::new(&[Vector::new(1.0, 3.0, 0.0)], |cable, load| cable.friction(0.5).tension(load));
+    hoist.step(60);
+    let load = hoist.load;
+    hoist.cable().set_tension(0.6 * load).unwrap();
+    hoist.step(60);
+    let before = hoist.height();
+    hoist.step(300);
+    let fallen = before - hoist.height();
+    let tensions = hoist.cable().tensions();
     println!("fell {fallen:e} m in 5 s, {tensions:?} of {load}");
     assert!(fallen.abs() < 1e-4);
     assert!((tensions[0] - load).abs() < 1e-3 * load);
@@ -186,34 +212,26 @@ fn a_finger_holds_a_ball_with_the_force_of_statics() {
 
 #[test]
 fn a_winch_keeps_to_its_speed_and_its_strength() {
-    let (mut physics, mut deformables) = world(Vector::Y * -9.81);
-    let soft = deformables.insert(weight(Vector::ZERO)).unwrap();
-    let body = &deformables.bodies[soft];
-    let (tied, load) = (top(body), body.mass() * G);
-    let points = [CablePoint::Vertex(soft, tied), CablePoint::World(Vector::new(0.0, 3.0, 0.0))];
-    let cable = DeformableCableBuilder::new(points).speed(0.2).max_tension(4.0 * load);
-    let cable = deformables.bodies.insert_cable(cable).unwrap();
-    steps(&mut physics, &mut deformables, 30);
-    let start = deformables.bodies[soft].center_of_mass()[1];
-    let free = deformables.bodies.cable(cable).unwrap().free_length().unwrap();
-    deformables.bodies.cable_mut(cable).unwrap().set_length(free - 1.0).unwrap();
-    steps(&mut physics, &mut deformables, 120);
-    let risen = deformables.bodies[soft].center_of_mass()[1] - start;
+    let mut hoist = Hoist::new(&[], |cable, load| cable.speed(0.2).max_tension(4.0 * load));
+    hoist.step(30);
+    let (start, load) = (hoist.height(), hoist.load);
+    let free = hoist.cable().free_length().unwrap();
+    hoist.cable().set_length(free - 1.0).unwrap();
+    hoist.step(120);
+    let risen = hoist.height() - start;
     println!("risen {risen} m in 2 s at 0.2 m/s");
     assert!((risen - 0.4).abs() < 1e-3);
     // Too weak: it runs off. The weight is damped by 5/s, so it sinks at g/2 · 1/5.
-    deformables.bodies.cable_mut(cable).unwrap().set_max_tension(0.5 * load).unwrap();
-    steps(&mut physics, &mut deformables, 60);
-    let body = &deformables.bodies[soft];
-    let tension = deformables.bodies.cable(cable).unwrap().tension();
-    println!("sinks at {} m/s under {tension} N of {load}", body.linear_momentum()[1] / body.mass());
+    hoist.cable().set_max_tension(0.5 * load).unwrap();
+    hoist.step(60);
+    let tension = hoist.cable().tension();
+    println!("sinks at {} m/s under {tension} N of {load}", hoist.speed());
     assert!((tension - 0.5 * load).abs() < 1e-9 * load);
-    assert!((body.linear_momentum()[1] / body.mass() + 0.5 * G / 5.0).abs() < 0.01);
+    assert!((hoist.speed() + 0.5 * G / 5.0).abs() < 0.01);
     // And takes up from where it is when it is strong again.
-    deformables.bodies.cable_mut(cable).unwrap().set_max_tension(100.0 * load).unwrap();
-    steps(&mut physics, &mut deformables, 30);
-    let speed = deformables.bodies[soft].linear_momentum()[1] / deformables.bodies[soft].mass();
-    assert!((speed - 0.2).abs() < 0.1, "{speed}");
+    hoist.cable().set_max_tension(100.0 * load).unwrap();
+    hoist.step(30);
+    assert!((hoist.speed() - 0.2).abs() < 0.01, "{}", hoist.speed());
 }
 
 #[test]
