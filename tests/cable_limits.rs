@@ -99,3 +99,41 @@ fn no_pull_makes_energy_or_nan() {
         }
     }
 }
+
+#[test]
+fn a_cloth_hangs_on_forty_cables_and_a_rope_on_two() {
+    let (mut physics, mut deformables) = world(Vector::Y * -9.81);
+    let material = DeformableMaterial::new(1.0e6, 0.3).mass_damping(8.0);
+    let cloth =
+        DeformableBodyBuilder::cloth([0.5, 0.5], [10, 10], 1.0e-3).material(material).can_sleep(false);
+    let cloth = deformables.insert(cloth).unwrap();
+    let body = &deformables.bodies[cloth];
+    let edge = at_rest_where(body, |x| x.iter().any(|c| c.abs() > 0.499));
+    assert_eq!(edge.len(), 40);
+    let at: Vec<[f64; 3]> = edge.iter().map(|v| body.position(*v).unwrap()).collect();
+    let mut cables = Vec::new();
+    for (vertex, at) in edge.iter().zip(at) {
+        let hook = Vector::new(1.2 * at[0] as f32, 0.5, 1.2 * at[2] as f32);
+        let cable =
+            DeformableCableBuilder::new([CablePoint::Vertex(cloth, *vertex), CablePoint::World(hook)]);
+        cables.push(deformables.bodies.insert_cable(cable.compliance(1.0e-4)).unwrap());
+    }
+    let points: Vec<Vector> = (0..=10).map(|k| Vector::new(2.0 + 0.05 * k as f32, 0.0, 0.0)).collect();
+    let rope = DeformableBodyBuilder::rope(&points, 0.005).material(material).can_sleep(false);
+    let rope = deformables.insert(rope).unwrap();
+    let mut sling = Vec::new();
+    for (vertex, x) in [(0, 2.0), (10, 2.5)] {
+        let points = [CablePoint::Vertex(rope, vertex), CablePoint::World(Vector::new(x, 0.5, 0.0))];
+        sling.push(deformables.bodies.insert_cable(DeformableCableBuilder::new(points)).unwrap());
+    }
+    steps(&mut physics, &mut deformables, 400);
+    for (body, cables) in [(cloth, cables), (rope, sling)] {
+        let carried: f64 = cables
+            .iter()
+            .map(|cable| f64::from(deformables.bodies.cable(*cable).unwrap().force(0).unwrap().y))
+            .sum();
+        let weight = deformables.bodies[body].mass() * 9.81f32 as f64;
+        println!("{carried} N of {weight}, {:e} m/s", deformables.bodies[body].max_speed());
+        assert!((carried / weight - 1.0).abs() < 1e-3);
+    }
+}
