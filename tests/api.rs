@@ -27,12 +27,12 @@ promises! {
         Acceleration, FactorPrecision, Fidelity, Elasticity, CavityFilling, CablePoint, ContactWrench, DepthCamera, TactilePad, TactileReading, DeformableCable, DeformableCableBuilder, DeformableCableHandle, foible3d::DeformableCavity, DeformableBodyHandle, DeformableAttachment,
         DeformableAttachmentHandle, AttachTo, DeformableContact, DeformablePairContact, RigidContact, JointForce,
         JointRole, SolvedJoint, DeformableSurfacePoint, DeformableBodyError, BodyError, HandleError, MaterialError,
-        MeshError, DeformableContactPartner, DeformableWind, DeformableRest, DeformableMode, MaxwellBranch, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceFault, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableDrag, DeformableCollisionEvent,
+        MeshError, DeformableContactPartner, DeformableWind, DeformableRest, DeformableMode, DeformableTape, DeformableLoss, DeformableGradient, MaterialGradient, StepGradient, MaxwellBranch, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceFault, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableDrag, DeformableCollisionEvent,
         DeformableContactForceEvent, DeformableChannelEventCollector, DeformableSolverContact,
         DeformablePairFilterContext<'static>, DeformableContactModificationContext<'static>;
-    is_printed: DeformableDrag, DeformableColliders, DeformableSkin, DeformableSurfaceMesh, DeformableChannelEventCollector, DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody,
+    is_printed: DeformableTape, DeformableLoss, DeformableGradient, MaterialGradient, StepGradient, DeformableDrag, DeformableColliders, DeformableSkin, DeformableSurfaceMesh, DeformableChannelEventCollector, DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody,
         DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh, Structure, DeformableAttachment, DeformableCable, DeformableCableBuilder, DepthCamera, TactilePad, TactileReading;
-    is_cloned: DepthCamera, TactilePad, TactileReading, DeformableSkin, DeformableSurfaceMesh, DeformableWorld, DeformableBodySet, DeformableBody, DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh,
+    is_cloned: DeformableTape, DeformableLoss, DeformableGradient, DepthCamera, TactilePad, TactileReading, DeformableSkin, DeformableSurfaceMesh, DeformableWorld, DeformableBodySet, DeformableBody, DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh,
         Structure, DeformableAttachment, DeformableCable, DeformableCableBuilder, AttachTo, DeformableBodyError, MeshError;
 }
 

@@ -1,0 +1,109 @@
+//! One step backward: the derivatives with respect to its end become those with respect to its start, and to all that acts in it.
+//!
+//! The end solves `F₁ = r(x′) + Jᵀλ = 0` and the laws of the contacts that bind, `F₂ = 0`. With `g = ∂L/∂x′ + ∂L/∂v′/h` and
+//! `H = −∂r/∂x′`, the adjoint z, q of section 14 of docs/method.md gives `dL/dθ = z·∂F₁/∂θ + q·∂F₂/∂θ`.
+
+use super::contact_rows::ContactRows;
+use super::gradient::{DeformableGradient, StepGradient};
+use super::parameters::{ElasticWork, Inertia};
+use super::record::StepRecord;
+use super::spin::{Cotangents, through_spin};
+use super::tangent::Tangent;
+use crate::fem::{DeformableModel, Elements};
+use crate::math::Vec3;
+
+/// What goes backward over the steps.
+pub(super) struct Backward<'a> {
+    model: &'a DeformableModel,
+    tangent: Tangent,
+    force: Vec<Vec3>,
+    /// With respect to the state between two steps.
+    pub x: Vec<Vec3>,
+    pub v: Vec<Vec3>,
+}
+
+impl<'a> Backward<'a> {
+    /// `None` for a mesh whose matrix cannot be put together.
+    pub fn new(model: &'a DeformableModel) -> Option<Self> {
+        let zeros = vec![Vec3::zeros(); model.rest.len()];
+        let tangent = Tangent::new(model)?;
+        Some(Self { model, tangent, force: Vec::new(), x: zeros.clone(), v: zeros })
+    }
+
+    /// Goes through a step, with what the loss says of the forces of colliders in it.
+    ///
+    /// # Errors
+    /// Why there is no gradient.
+    pub fn step(
+        &mut self,
+        record: &StepRecord,
+        of_colliders: &[(u64, Vec3)],
+        out: &mut DeformableGradient,
+    ) -> Result<(), &'static str> {
+        let (model, h, n) = (self.model, record.h, record.x_end.len());
+        let inertia = Inertia::new(model, &record.materials);
+        let zeros = || vec![Vec3::zeros(); n];
+        let mut of = Cotangents {
+            x_end: std::mem::take(&mut self.x),
+            v_end: std::mem::take(&mut self.v),
+            x_start: zeros(),
+            v_start: zeros(),
+            forces: zeros(),
+            gravity: Vec3::zeros(),
+            masses: vec![0.0; n],
+            damping: 0.0,
+        };
+        if record.keeps_spin {
+            through_spin(record, &inertia, &mut of);
+        }
+        let mut g: Vec<Vec3> = of.x_end.iter().zip(&of.v_end).map(|(x, v)| x + v / h).collect();
+        of.x_start.iter_mut().zip(&of.v_end).for_each(|(x, v)| *x -= v / h);
+        let mut is_free = vec![true; n];
+        let mut of_pins = zeros();
+        for &pin in &record.pins {
+            is_free[pin as usize] = false;
+            of_pins[pin as usize] = std::mem::take(&mut g[pin as usize]);
+        }
+        let elements = Elements { model, materials: &record.materials, activation: record.activation };
+        if !self.tangent.update(&elements, &record.x_end, &record.pins, h) {
+            return Err("its stiffness has no inverse");
+        }
+        let rows = ContactRows::new(&record.contacts);
+        let share = rows.solve(&mut self.tangent, &is_free, of_colliders, &mut g);
+        let (share, z) = (share.ok_or("its contacts say too little or too much")?, g);
+        self.tangent.take_off_pins(&z, &mut of_pins);
+        record.pins.iter().map(|&pin| pin as usize).for_each(|pin| of_pins[pin] += share.of_end[pin]);
+        of.x_start.iter_mut().zip(&share.of_start).for_each(|(x, c)| *x += c);
+        out.friction += share.of_friction;
+        add_inertia(record, &inertia, &z, &mut of);
+        let mut work = ElasticWork { model, record, z: &z, force: &mut self.force };
+        work.add_materials(&mut out.materials);
+        let activation = work.activation();
+        inertia.add_materials(model, record, (&of.masses, of.damping), &mut out.materials);
+        let users = |nodes: &[Vec3]| model.nodes_by_vertex().map(|n| nodes[n].into()).collect();
+        out.steps.push(StepGradient {
+            forces: users(&of.forces),
+            pin_targets: users(&of_pins),
+            gravity: of.gravity.into(),
+            activation,
+            velocities: users(&of.v_start),
+        });
+        (self.x, self.v) = (of.x_start, of.v_start);
+        Ok(())
+    }
+}
+
+/// What z says of `m ((xₙ + h vₙ − x′)/h² + g − α (x′ − xₙ)/h) + f`.
+fn add_inertia(record: &StepRecord, inertia: &Inertia, z: &[Vec3], of: &mut Cotangents) {
+    let (h, alpha) = (record.h, inertia.damping);
+    for (i, (z, m)) in z.iter().zip(&inertia.masses).enumerate() {
+        let moved = record.x_end[i] - record.x_start[i];
+        of.x_start[i] += z * (m * (1.0 / (h * h) + alpha / h));
+        of.v_start[i] += z * (m / h);
+        of.forces[i] += z;
+        of.gravity += z * (m * record.gravity_scale);
+        let change = (record.v_start[i] - moved / h) / h;
+        of.masses[i] += z.dot(&(change + record.gravity * record.gravity_scale - moved * (alpha / h)));
+        of.damping -= m * z.dot(&moved) / h;
+    }
+}
