@@ -10,6 +10,9 @@ use rapier3d::dynamics::RigidBodyType;
 /// Residual over the forces, and error of contact forces over the largest of them, up to which a step counts as solved: what is
 /// left of it is an error of the gradient.
 const SOLVED: f64 = 1.0e-6;
+/// Distance of a contact that carries from where it is to end, over the mean edge, up to which it counts as solved: what the
+/// iteration of the shifts has left.
+const SETTLED: f64 = 1.0e-7;
 /// Part of the limit of friction from which on a contact slides.
 const SLIDES: f64 = 1.0 - 1.0e-6;
 /// Turn \[rad\] in a step of which the loss is seen, if it is given back.
@@ -60,10 +63,11 @@ impl StepRecord {
     /// Why there is no gradient.
     pub fn new(body: &DeformableBody, solved: &SolvedBody<'_>, gravity: Vec3) -> Result<Self, &'static str> {
         check_body(body)?;
-        check_step(body, solved)?;
         let problem = solved.problem;
         let carries = |contact: &&SolvedContact<'_>| contact.force != Vec3::zeros();
         let contacts = solved.contacts.iter().filter(carries).map(ContactRecord::new);
+        let contacts = contacts.collect::<Result<_, _>>()?;
+        check_step(body, solved)?;
         let turn = Vec3::from(body.angvel()).norm() * problem.h();
         let is_mean = (0..body.state.v.len()).all(|n| body.state.v[n] == problem.mean_velocity(n));
         let is_free = solved.in_flight && problem.key.pins.is_empty() && problem.settings.keeps_spin;
@@ -83,7 +87,7 @@ impl StepRecord {
             gravity,
             gravity_scale: body.gravity_scale(),
             forces: body.forces.clone(),
-            contacts: contacts.collect::<Result<_, _>>()?,
+            contacts,
             keeps_spin,
         })
     }
@@ -105,9 +109,14 @@ fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
 fn check_step(body: &DeformableBody, solved: &SolvedBody<'_>) -> Result<(), &'static str> {
     let problem = solved.problem;
     let is_solved = problem.residual() <= SOLVED * problem.force_scale() && solved.contact_error <= SOLVED;
+    let carries = |contact: &&SolvedContact<'_>| contact.force != Vec3::zeros();
+    let end = |c: &SolvedContact<'_>| c.constraint.frame[0].dot(&c.motion) + c.constraint.target_gap;
+    let near = SETTLED * body.model.surface.mean_edge;
+    let is_settled = solved.contacts.iter().filter(carries).all(|contact| end(contact).abs() <= near);
     let why = [
         (problem.is_rejected, "it was rejected"),
         (!is_solved, "it was not solved: `tolerance` and `max_iterations` have to be stricter"),
+        (!is_settled, "its contacts have not settled: a smaller step, or less friction, may help"),
         (body.state.x != problem.current.x, "the body was stopped at an obstacle"),
         (!problem.impacts.is_empty(), "restitution has none"),
     ];
