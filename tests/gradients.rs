@@ -103,3 +103,71 @@ fn a_muscle_has_the_gradient_of_its_activation() {
     let error = state_error(&scene, &run, MATERIAL.iter().chain([&ACTIVATION, &modulus]));
     assert!(error < EXACT, "{error:e}");
 }
+
+#[test]
+fn checkpoints_replay_to_the_same_bits() {
+    let gradients = [None, Some(7)].map(|every| {
+        let mut physics = PhysicsWorld::new();
+        let mut world = DeformableWorld::new();
+        let beam = cantilever().material(material()).fidelity(Fidelity::Reference).can_sleep(false);
+        let beam = world.insert(beam).unwrap();
+        let push = |step: usize, _: &mut PhysicsWorld, world: &mut DeformableWorld| {
+            let body = &mut world.bodies[beam];
+            body.reset_forces();
+            body.add_force(&[4], Vector::Z * (step as f32 * 0.1)).unwrap();
+        };
+        let mut tape = DeformableTape::new(&world, beam).unwrap();
+        if let Some(every) = every {
+            tape = tape.checkpoint_every(every);
+        }
+        for step in 0..20 {
+            push(step, &mut physics, &mut world);
+            tape.step(&mut physics, &mut world).unwrap();
+        }
+        let mut loss = tape.loss();
+        loss.add_position(19, 4, [1.0, 2.0, 3.0]).unwrap();
+        loss.add_velocity(11, 4, [1.0, 2.0, 3.0]).unwrap();
+        assert!(tape.len() == 20 && tape.backward(&loss).is_err() == every.is_some());
+        if every.is_some() { tape.replay(&loss, push).unwrap() } else { tape.backward(&loss).unwrap() }
+    });
+    assert_eq!(gradients[0], gradients[1]);
+    assert!(gradients[0].steps.len() == 20 && gradients[0].material().youngs_modulus != 0.0);
+}
+
+/// Positions of the tip of a cantilever over time, with the tape of them.
+fn swing(modulus: f64) -> (DeformableTape, usize, Vec<f64>) {
+    let mut physics = PhysicsWorld::new();
+    let mut world = DeformableWorld::new();
+    let beam = cantilever().material(material().youngs_modulus(modulus)).fidelity(Fidelity::Reference);
+    let beam = world.insert(beam.can_sleep(false)).unwrap();
+    let tip = world.bodies[beam].vertices_where(|x| x.x > 0.249)[0];
+    let mut tape = DeformableTape::new(&world, beam).unwrap();
+    let mut heights = Vec::new();
+    for _ in 0..20 {
+        tape.step(&mut physics, &mut world).unwrap();
+        heights.push(world.bodies[beam].position(tip).unwrap()[1]);
+    }
+    (tape, tip, heights)
+}
+
+#[test]
+fn youngs_modulus_is_found_from_a_trajectory() {
+    let (_, _, seen) = swing(2.0e5);
+    let mut modulus = 1.2e5_f64;
+    for round in 0..8 {
+        let (tape, tip, heights) = swing(modulus);
+        // Gauss and Newton: each of the heights has a derivative of its own.
+        let (mut along, mut curvature) = (0.0, 0.0);
+        for (step, (height, seen)) in heights.iter().zip(&seen).enumerate() {
+            let mut loss = tape.loss();
+            loss.add_position(step, tip, [0.0, 1.0, 0.0]).unwrap();
+            let slope = tape.backward(&loss).unwrap().material().youngs_modulus * modulus;
+            along += slope * (height - seen);
+            curvature += slope * slope;
+        }
+        // Of the logarithm, which keeps it positive.
+        modulus *= (-along / curvature).clamp(-0.5, 0.5).exp();
+        println!("{round}: {modulus} Pa");
+    }
+    assert!((modulus / 2.0e5 - 1.0).abs() < 1e-6, "{modulus}");
+}

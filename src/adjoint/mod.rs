@@ -2,6 +2,7 @@
 //! loads, pins, activation and start. Every recorded step is the solution of `F(x′, λ) = 0`, its balance of forces and the laws of
 //! its contacts that bind; going backward takes one solve with the transpose of its derivative a step.
 
+mod checkpoint;
 mod contact_rows;
 mod gradient;
 mod loss;

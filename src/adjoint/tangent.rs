@@ -140,3 +140,37 @@ fn gmres(
     }
     rhs[y.len()].abs() <= 1.0e2 * TOLERANCE * size
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::energy::Elasticity;
+    use crate::material::DeformableMaterial;
+    use crate::mesh::TetMesh;
+
+    #[test]
+    fn an_indefinite_hessian_is_solved_with_too() {
+        let model = DeformableModel::new(&TetMesh::cuboid([0.3, 0.1, 0.1], [6, 2, 2]).unwrap());
+        let material = DeformableMaterial::new(1e5, 0.3).elasticity(Elasticity::NeoHookean);
+        let elements = Elements { model: &model, materials: &[material], activation: 1.0 };
+        let pins: Vec<u32> =
+            (0..model.rest.len() as u32).filter(|n| model.rest[*n as usize].x < -0.29).collect();
+        for (squeeze, is_definite) in [(1.0, true), (0.6, false)] {
+            // Squeezed along its length it would buckle.
+            let x: Vec<Vec3> = model.rest.iter().map(|X| Vec3::new(X.x * squeeze, X.y, X.z)).collect();
+            let mut tangent = Tangent::new(&model).unwrap();
+            assert!(tangent.update(&elements, &x, &pins, 1.0));
+            assert_eq!(tangent.values.is_none(), is_definite);
+            let symbolic = &tangent.symbolic;
+            let values = assemble_tangent(&elements, &x, false, &pins, 1.0, symbolic);
+            let mut b: Vec<f64> = (0..3 * x.len()).map(|k| ((k * 7919) % 101) as f64 - 50.0).collect();
+            pins.iter().for_each(|pin| b[3 * *pin as usize..][..3].fill(0.0));
+            let mut z = b.clone();
+            assert!(tangent.solve(&mut z));
+            let left = product(&tangent.symbolic, &values, &z);
+            let error = left.iter().zip(&b).map(|(l, b)| (l - b).abs()).fold(0.0, f64::max);
+            // Of 50 N; the preconditioned residual is below 1e-12, times the condition of 1e4.
+            assert!(error < 1e-6, "{squeeze}: {error:e}");
+        }
+    }
+}
