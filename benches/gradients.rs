@@ -22,7 +22,7 @@ fn times(cells: [usize; 3], solver: Solver, floor: Option<f32>, elasticity: Elas
         let beam = if floor.is_some() { beam } else { beam.pinned(|x| x.x < -0.499) };
         let settings = SolverSettings::default().solver(solver).tolerance(1e-9).max_iterations(500);
         let mut deformables = DeformableWorld::new();
-        let settings = settings.keeps_spin(false).contact_tolerance(1e-10);
+        let settings = settings.keeps_spin(false).contact_tolerance(1e-12);
         let beam = deformables.insert(beam.settings(settings).can_sleep(false)).unwrap();
         let mut tape = DeformableTape::new(&deformables, beam).unwrap();
         let start = Instant::now();

@@ -6,7 +6,7 @@
 use super::contact_rows::ContactRows;
 use super::gradient::{DeformableGradient, StepGradient};
 use super::parameters::{ElasticWork, Inertia};
-use super::record::StepRecord;
+use super::record::{ContactRecord, StepRecord};
 use super::spin::{Cotangents, through_spin};
 use super::tangent::Tangent;
 use crate::fem::{DeformableModel, Elements};
@@ -58,21 +58,41 @@ impl<'a> Backward<'a> {
         }
         let mut g: Vec<Vec3> = of.x_end.iter().zip(&of.v_end).map(|(x, v)| x + v / h).collect();
         of.x_start.iter_mut().zip(&of.v_end).for_each(|(x, v)| *x -= v / h);
-        let mut is_free = vec![true; n];
-        let mut of_pins = zeros();
-        for &pin in &record.pins {
-            is_free[pin as usize] = false;
-            of_pins[pin as usize] = std::mem::take(&mut g[pin as usize]);
+        let (stuck, others) = stuck_contacts(record);
+        let mut fixed = record.pins.clone();
+        fixed.extend(stuck.iter().map(|(node, _)| *node as u32));
+        fixed.sort_unstable();
+        let (mut is_free, mut of_fixed) = (vec![true; n], zeros());
+        for &node in &fixed {
+            is_free[node as usize] = false;
+            of_fixed[node as usize] = std::mem::take(&mut g[node as usize]);
         }
         let elements = Elements { model, materials: &record.materials, activation: record.activation };
-        if !self.tangent.update(&elements, &record.x_end, &record.pins, h) {
+        if !self.tangent.update(&elements, &record.x_end, &fixed, h) {
             return Err("its stiffness has no inverse");
         }
-        let rows = ContactRows::new(&record.contacts);
+        let mut z_stuck = zeros();
+        for (node, contact) in &stuck {
+            let own = of_colliders.iter().filter(|(collider, _)| *collider == contact.collider);
+            z_stuck[*node] = -own.map(|(_, derivative)| *derivative).sum::<Vec3>();
+        }
+        self.tangent.take_off_free(&z_stuck, &is_free, &mut g);
+        let rows = ContactRows::new(&others);
         let share = rows.solve(&mut self.tangent, &is_free, of_colliders, &mut g);
-        let (share, z) = (share.ok_or("its contacts say too little or too much")?, g);
-        self.tangent.take_off_pins(&z, &mut of_pins);
-        record.pins.iter().map(|&pin| pin as usize).for_each(|pin| of_pins[pin] += share.of_end[pin]);
+        let (share, mut z) = (share.ok_or("its contacts say too little or too much")?, g);
+        stuck.iter().for_each(|(node, _)| z[*node] = z_stuck[*node]);
+        self.tangent.take_off_pinned(&z, &mut of_fixed);
+        let held = 1.0 / (h * h) + inertia.damping / h;
+        for (node, contact) in stuck {
+            let carried = of_fixed[node] - z[node] * (held * inertia.masses[node]);
+            let normal = contact.frame[0];
+            let along = normal * normal.dot(&carried);
+            of.x_start[node] += if contact.recovers { carried } else { carried - along };
+        }
+        let mut of_pins = zeros();
+        for pin in record.pins.iter().map(|&pin| pin as usize) {
+            of_pins[pin] = of_fixed[pin] + share.of_end[pin];
+        }
         of.x_start.iter_mut().zip(&share.of_start).for_each(|(x, c)| *x += c);
         out.friction += share.of_friction;
         add_inertia(record, &inertia, &z, &mut of);
@@ -91,6 +111,22 @@ impl<'a> Backward<'a> {
         (self.x, self.v) = (of.x_start, of.v_start);
         Ok(())
     }
+}
+
+/// Nodes that stick with the only contact they have, and all other contacts.
+fn stuck_contacts(record: &StepRecord) -> (Vec<(usize, &ContactRecord)>, Vec<&ContactRecord>) {
+    let mut count = vec![0; record.x_end.len()];
+    record.contacts.iter().flat_map(ContactRecord::weighted_nodes).for_each(|(node, _)| count[node] += 1);
+    // What is led does not stick.
+    record.pins.iter().for_each(|&pin| count[pin as usize] = 2);
+    let (mut stuck, mut others) = (Vec::new(), Vec::new());
+    for contact in &record.contacts {
+        match contact.stuck_node().filter(|node| count[*node] == 1) {
+            Some(node) => stuck.push((node, contact)),
+            None => others.push(contact),
+        }
+    }
+    (stuck, others)
 }
 
 /// What z says of `m ((xₙ + h vₙ − x′)/h² + g − α (x′ − xₙ)/h) + f`.

@@ -5,6 +5,8 @@
 //! - if it sticks `t·(x′ − xₙ) = 0` for both tangents (beside what its partner moves),
 //! - if it slides `s (λ_t + μ λ_n û) = 0` with `û = u/|u|` and the constant `s = |u|/(μ λ_n)`, which makes metres of it.
 //!
+//! A node that sticks with its one contact moves by nothing but its partner: it is taken out of the unknowns as a pinned one is.
+//!
 //! With `C = ∂F₂/∂x′` and `D = ∂F₂/∂λ` the adjoint is `H z = g + Cᵀq`, `(J H⁻¹ Cᵀ + Dᵀ) q = −g_λ − J H⁻¹ g`. Normals, and the
 //! weights of points within triangles and edges, count as constant.
 
@@ -46,10 +48,10 @@ pub(super) struct ContactShare {
 }
 
 impl<'a> ContactRows<'a> {
-    pub fn new(contacts: &'a [ContactRecord]) -> Self {
-        let count = contacts.iter().map(ContactRecord::dimension).sum();
+    pub fn new(contacts: &[&'a ContactRecord]) -> Self {
+        let count = contacts.iter().map(|contact| contact.dimension()).sum();
         let (mut rows, mut of_forces) = (Vec::with_capacity(count), DMatrix::zeros(count, count));
-        for contact in contacts {
+        for &contact in contacts {
             let first = rows.len();
             let [normal, tangents @ ..] = contact.frame;
             let of_start = if contact.recovers { -1.0 } else { 0.0 };

@@ -12,7 +12,7 @@ use rapier3d::dynamics::RigidBodyType;
 const SOLVED: f64 = 1.0e-6;
 /// Distance of a contact that carries from where it is to end, over the mean edge, up to which it counts as solved: what the
 /// iteration of the shifts has left.
-const SETTLED: f64 = 1.0e-7;
+const SETTLED: f64 = 1.0e-6;
 /// Part of the limit of friction from which on a contact slides.
 const SLIDES: f64 = 1.0 - 1.0e-6;
 /// Turn \[rad\] in a step of which the loss is seen, if it is given back.
@@ -157,6 +157,13 @@ impl ContactRecord {
     /// Number of its rows.
     pub fn dimension(&self) -> usize {
         if self.friction > 0.0 { 3 } else { 1 }
+    }
+
+    /// The one node that it acts on, if it sticks.
+    pub fn stuck_node(&self) -> Option<usize> {
+        let mut nodes = self.weighted_nodes();
+        let (node, _) = nodes.next()?;
+        (self.friction > 0.0 && self.slip.is_none() && nodes.next().is_none()).then_some(node)
     }
 
     /// The nodes that it acts on, with their weights.

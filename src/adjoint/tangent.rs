@@ -18,7 +18,7 @@ pub(super) struct Tangent {
     factor: Option<Factor>,
     /// Of a Hessian that is not definite.
     values: Option<Vec<f64>>,
-    /// Its blocks between pinned nodes and free ones.
+    /// Its elastic blocks in the rows of pinned nodes.
     beside: Vec<(usize, usize, Mat3)>,
 }
 
@@ -63,8 +63,14 @@ impl Tangent {
     }
 
     /// Takes `K z` off what acts on pinned nodes.
-    pub fn take_off_pins(&self, z: &[Vec3], out: &mut [Vec3]) {
+    pub fn take_off_pinned(&self, z: &[Vec3], out: &mut [Vec3]) {
         self.beside.iter().for_each(|(i, j, block)| out[*i] -= block * z[*j]);
+    }
+
+    /// Takes `K z`, z of pinned nodes, off what acts on free ones.
+    pub fn take_off_free(&self, z: &[Vec3], is_free: &[bool], out: &mut [Vec3]) {
+        let to_free = self.beside.iter().filter(|(i, j, _)| is_free[*j] && z[*i] != Vec3::zeros());
+        to_free.for_each(|(i, j, block)| out[*j] -= block.tr_mul(&z[*i]));
     }
 }
 

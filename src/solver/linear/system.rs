@@ -154,7 +154,7 @@ pub(crate) fn assemble_tangent(
     assemble_tangent_beside(elements, x, projected, pins, h, symbolic, |_, _, _| ())
 }
 
-/// As [`assemble_tangent`], with `beside(i, j, K)` for every block of an element between a pinned node i and a free one j.
+/// As [`assemble_tangent`], with `beside(i, j, K)` for every block of an element in the row of a pinned node i.
 pub(crate) fn assemble_tangent_beside(
     elements: &Elements<'_>,
     x: &[Vec3],
@@ -168,8 +168,11 @@ pub(crate) fn assemble_tangent_beside(
     let mut matrix = Upper::new(model, materials, pins, SystemMatrix::RestStiffness, h, symbolic);
     let stiffening = |material: &DeformableMaterial| material.stiffening(h);
     add_tangents(elements, x, projected, stiffening, |i, j, block| {
-        if matrix.pinned[i] && !matrix.pinned[j] {
+        if matrix.pinned[i] {
             beside(i, j, block);
+        }
+        if matrix.pinned[j] && i != j {
+            beside(j, i, &block.transpose());
         }
         matrix.add_elastic(i, j, block);
     });
