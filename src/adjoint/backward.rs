@@ -40,61 +40,16 @@ impl<'a> Backward<'a> {
         of_colliders: &[(u64, Vec3)],
         out: &mut DeformableGradient,
     ) -> Result<(), &'static str> {
-        let (model, h, n) = (self.model, record.h, record.x_end.len());
+        let (model, h) = (self.model, record.h);
         let inertia = Inertia::new(model, &record.materials);
-        let zeros = || vec![Vec3::zeros(); n];
-        let mut of = Cotangents {
-            x_end: std::mem::take(&mut self.x),
-            v_end: std::mem::take(&mut self.v),
-            x_start: zeros(),
-            v_start: zeros(),
-            forces: zeros(),
-            gravity: Vec3::zeros(),
-            masses: vec![0.0; n],
-            damping: 0.0,
-        };
+        let mut of = Cotangents::new(std::mem::take(&mut self.x), std::mem::take(&mut self.v));
         if record.keeps_spin {
             through_spin(record, &inertia, &mut of);
         }
-        let mut g: Vec<Vec3> = of.x_end.iter().zip(&of.v_end).map(|(x, v)| x + v / h).collect();
+        let g: Vec<Vec3> = of.x_end.iter().zip(&of.v_end).map(|(x, v)| x + v / h).collect();
         of.x_start.iter_mut().zip(&of.v_end).for_each(|(x, v)| *x -= v / h);
-        let (stuck, others) = stuck_contacts(record);
-        let mut fixed = record.pins.clone();
-        fixed.extend(stuck.iter().map(|(node, _)| *node as u32));
-        fixed.sort_unstable();
-        let (mut is_free, mut of_fixed) = (vec![true; n], zeros());
-        for &node in &fixed {
-            is_free[node as usize] = false;
-            of_fixed[node as usize] = std::mem::take(&mut g[node as usize]);
-        }
-        let elements = Elements { model, materials: &record.materials, activation: record.activation };
-        if !self.tangent.update(&elements, &record.x_end, &fixed, h) {
-            return Err("its stiffness has no inverse");
-        }
-        let mut z_stuck = zeros();
-        for (node, contact) in &stuck {
-            let own = of_colliders.iter().filter(|(collider, _)| *collider == contact.collider);
-            z_stuck[*node] = -own.map(|(_, derivative)| *derivative).sum::<Vec3>();
-        }
-        self.tangent.take_off_free(&z_stuck, &is_free, &mut g);
-        let rows = ContactRows::new(&others);
-        let share = rows.solve(&mut self.tangent, &is_free, of_colliders, &mut g);
-        let (share, mut z) = (share.ok_or("its contacts say too little or too much")?, g);
-        stuck.iter().for_each(|(node, _)| z[*node] = z_stuck[*node]);
-        self.tangent.take_off_pinned(&z, &mut of_fixed);
-        let held = 1.0 / (h * h) + inertia.damping / h;
-        for (node, contact) in stuck {
-            let carried = of_fixed[node] - z[node] * (held * inertia.masses[node]);
-            let normal = contact.frame[0];
-            let along = normal * normal.dot(&carried);
-            of.x_start[node] += if contact.recovers { carried } else { carried - along };
-        }
-        let mut of_pins = zeros();
-        for pin in record.pins.iter().map(|&pin| pin as usize) {
-            of_pins[pin] = of_fixed[pin] + share.of_end[pin];
-        }
-        of.x_start.iter_mut().zip(&share.of_start).for_each(|(x, c)| *x += c);
-        out.friction += share.of_friction;
+        let (z, of_pins) = self.solve(record, &inertia, of_colliders, g, &mut of)?;
+        out.friction += of.friction;
         add_inertia(record, &inertia, &z, &mut of);
         let mut work = ElasticWork { model, record, z: &z, force: &mut self.force };
         work.add_materials(&mut out.materials);
@@ -110,6 +65,56 @@ impl<'a> Backward<'a> {
         });
         (self.x, self.v) = (of.x_start, of.v_start);
         Ok(())
+    }
+
+    /// Solves for z, and for what is with respect to the targets of pins; adds what contacts say of the start, and of friction.
+    fn solve(
+        &mut self,
+        record: &StepRecord,
+        inertia: &Inertia,
+        of_colliders: &[(u64, Vec3)],
+        mut g: Vec<Vec3>,
+        of: &mut Cotangents,
+    ) -> Result<(Vec<Vec3>, Vec<Vec3>), &'static str> {
+        let (stuck, others) = stuck_contacts(record);
+        let mut fixed = record.pins.clone();
+        fixed.extend(stuck.iter().map(|(node, _)| *node as u32));
+        fixed.sort_unstable();
+        let (mut is_free, mut of_fixed) = (vec![true; g.len()], vec![Vec3::zeros(); g.len()]);
+        for &node in &fixed {
+            is_free[node as usize] = false;
+            of_fixed[node as usize] = std::mem::take(&mut g[node as usize]);
+        }
+        let elements =
+            Elements { model: self.model, materials: &record.materials, activation: record.activation };
+        if !self.tangent.update(&elements, &record.x_end, &fixed, record.h) {
+            return Err("its stiffness has no inverse");
+        }
+        let mut z_stuck = vec![Vec3::zeros(); g.len()];
+        for (node, contact) in &stuck {
+            let own = of_colliders.iter().filter(|(collider, _)| *collider == contact.collider);
+            z_stuck[*node] = -own.map(|(_, derivative)| *derivative).sum::<Vec3>();
+        }
+        self.tangent.take_off_free(&z_stuck, &is_free, &mut g);
+        let rows = ContactRows::new(&others);
+        let share = rows.solve(&mut self.tangent, &is_free, of_colliders, &mut g);
+        let (share, mut z) = (share.ok_or("its contacts say too little or too much")?, g);
+        stuck.iter().for_each(|(node, _)| z[*node] = z_stuck[*node]);
+        self.tangent.take_off_pinned(&z, &mut of_fixed);
+        let held = (1.0 / record.h + inertia.damping) / record.h;
+        for (node, contact) in stuck {
+            let carried = of_fixed[node] - z[node] * (held * inertia.masses[node]);
+            let normal = contact.frame[0];
+            let along = normal * normal.dot(&carried);
+            of.x_start[node] += if contact.recovers { carried } else { carried - along };
+        }
+        let mut of_pins = vec![Vec3::zeros(); z.len()];
+        for pin in record.pins.iter().map(|&pin| pin as usize) {
+            of_pins[pin] = of_fixed[pin] + share.of_end[pin];
+        }
+        of.x_start.iter_mut().zip(&share.of_start).for_each(|(x, c)| *x += c);
+        of.friction = share.of_friction;
+        Ok((z, of_pins))
     }
 }
 

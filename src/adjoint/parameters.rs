@@ -1,6 +1,6 @@
 //! Derivatives of the elastic forces with respect to material and activation, at positions held fast: differences of the forces
-//! themselves, so that they hold for every energy. In moduli and activation forces are linear, and differences exact; of
-//! Poisson's ratio, and of moduli where regions meet, they are of the fourth order.
+//! themselves, so that they hold for every energy. In moduli and activation forces are linear, and differences exact, but where
+//! regions meet: there they are of the fourth order. Those of Poisson's ratio are small.
 
 use super::gradient::MaterialGradient;
 use super::record::StepRecord;
@@ -9,8 +9,10 @@ use crate::fem::{DeformableModel, Elements, StiffnessDamping};
 use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3, dot};
 
-/// Differences of moduli, relative to Young's, of activation, and of Poisson's ratio relative to its distance from a half.
+/// Differences of moduli, relative to Young's, and of activation.
 const DIFFERENCE: f64 = 1.0e-3;
+/// Of Poisson's ratio, relative to its distance from a half: squared the error of the difference, 1e-16 over it that of rounding.
+const POISSON: f64 = 1.0e-5;
 
 /// Places and weights of a derivative: between two, four, and of five to one side.
 const LINEAR: &[(f64, f64)] = &[(1.0, 0.5), (-1.0, -0.5)];
@@ -59,14 +61,23 @@ impl ElasticWork<'_> {
 
     /// Adds the derivatives with respect to what is elastic in the materials.
     pub fn add_materials(&mut self, out: &mut [MaterialGradient]) {
-        let moduli = if out.len() > 1 { CENTRAL } else { LINEAR };
+        // Of one material without fibres all forces are in proportion to it.
+        let moduli = match (out.len(), self.model.has_fibres()) {
+            (1, false) => &[],
+            (1, true) => LINEAR,
+            _ => CENTRAL,
+        };
         for (region, out) in out.iter_mut().enumerate() {
             let DeformableMaterial { youngs_modulus, poisson_ratio, .. } = self.record.materials[region];
             let by = DIFFERENCE * youngs_modulus;
-            out.youngs_modulus += self.along(region, by, moduli, |m, d| m.youngs_modulus += d);
-            let apart = DIFFERENCE * (0.5 - poisson_ratio);
+            out.youngs_modulus += if moduli.is_empty() {
+                self.of(&self.record.materials, self.record.activation) / youngs_modulus
+            } else {
+                self.along(region, by, moduli, |m, d| m.youngs_modulus += d)
+            };
+            let apart = POISSON * (0.5 - poisson_ratio);
             // Below nought smoothed elements have no volume to keep.
-            let scheme = if poisson_ratio > 4.0 * apart { CENTRAL } else { FORWARD };
+            let scheme = if poisson_ratio > apart { LINEAR } else { FORWARD };
             out.poisson_ratio += self.along(region, apart, scheme, |m, d| m.poisson_ratio += d);
             if self.model.has_fibres() {
                 out.fibre_modulus += self.along(region, by, LINEAR, |m, d| m.fibre_modulus += d);

@@ -15,6 +15,26 @@ pub(super) struct Cotangents {
     pub gravity: Vec3,
     pub masses: Vec<f64>,
     pub damping: f64,
+    /// Of the coefficients of all contacts.
+    pub friction: f64,
+}
+
+impl Cotangents {
+    /// Those with respect to the end of a step, and none yet of others.
+    pub fn new(x_end: Vec<Vec3>, v_end: Vec<Vec3>) -> Self {
+        let zeros = vec![Vec3::zeros(); x_end.len()];
+        Self {
+            masses: vec![0.0; x_end.len()],
+            x_end,
+            v_end,
+            x_start: zeros.clone(),
+            v_start: zeros.clone(),
+            forces: zeros,
+            gravity: Vec3::zeros(),
+            damping: 0.0,
+            friction: 0.0,
+        }
+    }
 }
 
 /// Goes through it backward: what is with respect to `v′` becomes that with respect to `v̄`.

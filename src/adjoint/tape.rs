@@ -20,7 +20,7 @@ use std::sync::Arc;
 /// can be had: exact ones of the converged steps, for one solve a step. What its user changes between steps (forces, pins,
 /// activation, impulses) takes part; what moves or speeds vertices up counts as added to what was there.
 ///
-/// Steps have to be solved far: a [`tolerance`](crate::SolverSettings::tolerance) of 1e-9 or less, as that of
+/// Steps have to be solved far: a [`tolerance`](crate::SolverSettings::tolerance) of 1e-10 or less, as that of
 /// [`Fidelity::Reference`](crate::Fidelity::Reference). Contacts are those with colliders that do not yield. What has no gradient is
 /// refused by [`DeformableTape::record`]; it is listed in `docs/limits.md`.
 ///

@@ -70,6 +70,12 @@ fn weight(k: usize) -> f64 {
     ((k * 7919 + 13) % 101) as f64 / 50.0 - 1.0
 }
 
+fn add_floor(physics: &mut PhysicsWorld, height: f32, friction: f64) -> ColliderHandle {
+    let slab = ColliderBuilder::cuboid(50.0, 1.0, 50.0).friction(friction as f32);
+    let slab = slab.friction_combine_rule(CoefficientCombineRule::Max);
+    physics.insert(RigidBodyBuilder::fixed().translation(Vector::Y * (height - 1.0)), slab).1
+}
+
 impl Scene {
     pub fn new(builder: DeformableBodyBuilder) -> Self {
         Self { builder, steps: 30, floor: None, regions: Vec::new(), keeps_spin: false, look: 7, stride: 1.0 }
@@ -82,14 +88,7 @@ impl Scene {
     pub fn run(&self, run: &Run) -> Outcome {
         let mut physics = PhysicsWorld::new();
         physics.gravity = Vector::Y * run.gravity as f32;
-        let mut floor = None;
-        if let Some(height) = self.floor {
-            let slab = ColliderBuilder::cuboid(50.0, 1.0, 50.0).friction(run.friction as f32);
-            let slab = slab.friction_combine_rule(CoefficientCombineRule::Max);
-            floor = Some(
-                physics.insert(RigidBodyBuilder::fixed().translation(Vector::Y * (height - 1.0)), slab).1,
-            );
-        }
+        let floor = self.floor.map(|height| add_floor(&mut physics, height, run.friction));
         let mut world = DeformableWorld::new();
         let builder = self.builder.clone().material(run.material).can_sleep(false);
         let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
