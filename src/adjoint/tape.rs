@@ -116,7 +116,7 @@ impl DeformableTape {
         physics: &mut PhysicsWorld,
         deformables: &mut DeformableWorld,
     ) -> Result<(), DeformableBodyError> {
-        if self.checkpoint_every.is_some_and(|every| self.len() % every == 0) {
+        if self.checkpoint_every.is_some_and(|every| self.len().is_multiple_of(every)) {
             self.forgotten = self.len();
             self.steps.clear();
             self.checkpoints.push(Checkpoint::new(self.forgotten, physics, deformables));
