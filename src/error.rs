@@ -107,6 +107,14 @@ pub enum BodyError {
         /// Its components x, y, z and w.
         value: [f32; 4],
     },
+    /// A step that has no derivative that could be followed.
+    #[error("step {step} has no gradient: {what}")]
+    NoGradient {
+        /// Place of the step among those of the tape.
+        step: usize,
+        /// Why.
+        what: &'static str,
+    },
     /// No vertices to act on.
     #[error("{quantity}: the list of vertices is empty")]
     NoVertices {

@@ -22,6 +22,7 @@
 //! | `solver` | factors, a body's step, the cone problem, constraints of an island and its iteration |
 //! | `coupling` | rapier's sets, read into obstacles and proxies, and the reactions written back |
 //! | `pipeline` | the world, the pipeline and what can be read of a step; inside, the step as a list of verbs |
+//! | `adjoint` | gradients of a loss over recorded steps |
 //! | `export` | files of what has been simulated |
 //! | `touch` | taxels, markers, depth images and wrenches, read after a step |
 //!
@@ -87,10 +88,13 @@ mod coupling;
 
 mod pipeline;
 
+mod adjoint;
+
 mod export;
 
 mod touch;
 
+pub use adjoint::{DeformableGradient, DeformableLoss, DeformableTape, MaterialGradient, StepGradient};
 pub use body::{
     Acceleration, AttachTo, CablePoint, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
     DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableCable, DeformableCableBuilder,
@@ -132,13 +136,14 @@ pub mod prelude {
         DeformableCableBuilder, DeformableCableHandle, DeformableChannelEventCollector, DeformableColliders,
         DeformableCollisionEvent, DeformableContact, DeformableContactForceEvent,
         DeformableContactModificationContext, DeformableContactPartner, DeformableCounters, DeformableDrag,
-        DeformableEventHandler, DeformableHooks, DeformableMaterial, DeformableMode, DeformableModel,
-        DeformablePairContact, DeformablePairFilterContext, DeformableParameters, DeformablePipeline,
-        DeformableRest, DeformableSkin, DeformableSolverContact, DeformableStress, DeformableSurfaceMesh,
-        DeformableSurfacePoint, DeformableWind, DeformableWorld, DepthCamera, Elasticity, FactorPrecision,
-        Fidelity, Frames, Integrator, JointForce, JointMotorAxis, JointRole, MaxwellBranch, PhysicsParts,
-        RigidContact, SolvedJoint, Solver, SolverSettings, Structure, SurfaceMesh, SurfaceRepair,
-        SystemMatrix, TactilePad, TactileReading, TetMesh,
+        DeformableEventHandler, DeformableGradient, DeformableHooks, DeformableLoss, DeformableMaterial,
+        DeformableMode, DeformableModel, DeformablePairContact, DeformablePairFilterContext,
+        DeformableParameters, DeformablePipeline, DeformableRest, DeformableSkin, DeformableSolverContact,
+        DeformableStress, DeformableSurfaceMesh, DeformableSurfacePoint, DeformableTape, DeformableWind,
+        DeformableWorld, DepthCamera, Elasticity, FactorPrecision, Fidelity, Frames, Integrator, JointForce,
+        JointMotorAxis, JointRole, MaterialGradient, MaxwellBranch, PhysicsParts, RigidContact, SolvedJoint,
+        Solver, SolverSettings, StepGradient, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix,
+        TactilePad, TactileReading, TetMesh,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the ground up.
-const ROOMS: [&[&str]; 14] = [
+const ROOMS: [&[&str]; 15] = [
     &["math", "profiler", "threads"],
     &["mesh"],
     &["energy"],
@@ -21,6 +21,7 @@ const ROOMS: [&[&str]; 14] = [
     &["solver"],
     &["coupling"],
     &["pipeline"],
+    &["adjoint"],
     &["export"],
     &["touch"],
 ];

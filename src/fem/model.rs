@@ -217,6 +217,10 @@ impl DeformableModel {
         }
     }
 
+    pub(crate) fn has_fibres(&self) -> bool {
+        !self.fibres.is_empty()
+    }
+
     /// Number of vertices.
     pub fn vertex_count(&self) -> usize {
         self.rest.len()

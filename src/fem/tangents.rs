@@ -7,7 +7,7 @@ use crate::energy::{ElementEnergy, Mode, modes, with_energy};
 use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3};
 
-/// Calls `add(i, j, K)` with the blocks `K = −∂fᵢ/∂xⱼ` [N/m] of every element at positions `x`. With
+/// Calls `add(i, j, K)` with the blocks `K = −∂fᵢ/∂xⱼ` [N/m], i ≥ j, of every element at positions `x`. With
 /// `projected` without the modes of negative stiffness: positive semi-definite then.
 pub(crate) fn add_tangents(
     elements: &Elements<'_>,
@@ -46,7 +46,7 @@ pub(crate) fn add_tangents(
             K = semidefinite(&K);
         }
         for (i, a) in stencil.terms() {
-            for (j, b) in stencil.terms() {
+            for (j, b) in stencil.terms().filter(|(j, _)| *j <= i) {
                 add(i, j, &(K * (a * b)));
             }
         }
@@ -56,7 +56,7 @@ pub(crate) fn add_tangents(
 /// The blocks `Σ_k w_k u_k,a u_k,bᵀ` of an element with the modes' sides u, mode by mode.
 fn add_products(nodes: &[u32], weights: &[f64], sides: &[Vec3], add: &mut impl FnMut(usize, usize, &Mat3)) {
     for (a, &i) in nodes.iter().enumerate() {
-        for (b, &j) in nodes.iter().enumerate() {
+        for (b, &j) in nodes.iter().enumerate().filter(|(_, j)| **j <= i) {
             let mut block = Mat3::zeros();
             for (weight, sides) in weights.iter().zip(sides.chunks_exact(nodes.len())) {
                 block += sides[a] * (sides[b] * *weight).transpose();
@@ -134,6 +134,10 @@ mod tests {
                     add_tangents(&elements, &x, project, |_| 1.0, |i, j, block| {
                         let mut part = out.view_mut((3 * i, 3 * j), (3, 3));
                         part += block;
+                        if i != j {
+                            let mut part = out.view_mut((3 * j, 3 * i), (3, 3));
+                            part += block.transpose();
+                        }
                     });
                 }
                 let eps = 1e-6;

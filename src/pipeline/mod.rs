@@ -25,4 +25,5 @@ pub use events::{
 pub use parameters::{DeformableCounters, DeformableParameters};
 pub use pipeline::DeformablePipeline;
 pub use statics::DeformableRest;
+pub(crate) use step::{SolvedBody, SolvedContact};
 pub use world::DeformableWorld;

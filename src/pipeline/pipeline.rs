@@ -3,8 +3,10 @@
 use super::contacts::{JointForce, RigidContact};
 use super::events::{DeformableCollisionEvent, DeformableContactForceEvent, DeformableEventHandler};
 use super::parameters::{DeformableCounters, DeformableParameters};
-use super::step::StepScratch;
-use crate::body::{DeformableBodySet, DeformableContact, DeformablePairContact, Integrator};
+use super::step::{SolvedBody, StepScratch};
+use crate::body::{
+    DeformableBodyHandle, DeformableBodySet, DeformableContact, DeformablePairContact, Integrator,
+};
 use crate::coupling::{DeformableHooks, PhysicsParts};
 use crate::error::DeformableBodyError;
 use crate::solver::{FactorKey, SECOND_ORDER, alpha_step};
@@ -158,6 +160,11 @@ impl DeformablePipeline {
     /// Forces of the joints that the last step solved, axis by axis.
     pub fn joint_forces(&self) -> &[JointForce] {
         &self.scratch.joint_forces
+    }
+
+    /// What the last step has solved of a body; `None` if it was not stepped.
+    pub(crate) fn solved(&self, body: DeformableBodyHandle) -> Option<SolvedBody<'_>> {
+        self.scratch.solved(body)
     }
 
     /// What the last step did.

@@ -23,7 +23,9 @@ mod detect;
 mod factors;
 mod finish;
 mod solve;
+mod solved;
 
 mod run;
 
 pub(super) use scratch::StepScratch;
+pub(crate) use solved::{SolvedBody, SolvedContact};

@@ -36,15 +36,16 @@ pub(crate) use affine_modes::{CoarseInverse, MODES};
 pub(crate) use block_matrix::{BlockFactor, BlockMatrix};
 pub(crate) use compliance_columns::ComplianceColumns;
 pub(crate) use factor::{FactorScratch, Symbolic};
+pub(crate) use factor_values::Factor;
 pub(crate) use rigid_mode::{SLENDER, rigid_mobility};
 
 pub(crate) use factor_cache::{FactorCache, FactorId, SystemFactor, columns_pay};
 pub use modes::DeformableMode;
 pub(crate) use preconditioner::{BlockForm, Preconditioner};
-pub(crate) use system::{FactorKey, assemble_tangent};
+pub(crate) use system::{FactorKey, assemble_tangent, assemble_tangent_beside, pattern_of};
 pub(crate) use unused_factors::STEPS_KEPT;
 #[cfg(test)]
 pub(crate) use {
     operator::{ConjugateScratch, StiffnessOperator},
-    system::{assemble, pattern_of},
+    system::assemble,
 };

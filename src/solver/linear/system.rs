@@ -151,10 +151,31 @@ pub(crate) fn assemble_tangent(
     h: f64,
     symbolic: &Symbolic,
 ) -> Vec<f64> {
+    assemble_tangent_beside(elements, x, projected, pins, h, symbolic, |_, _, _| ())
+}
+
+/// As [`assemble_tangent`], with `beside(i, j, K)` for every block of an element in the row of a pinned node i.
+pub(crate) fn assemble_tangent_beside(
+    elements: &Elements<'_>,
+    x: &[Vec3],
+    projected: bool,
+    pins: &[u32],
+    h: f64,
+    symbolic: &Symbolic,
+    mut beside: impl FnMut(usize, usize, &Mat3),
+) -> Vec<f64> {
     let Elements { model, materials, .. } = elements;
     let mut matrix = Upper::new(model, materials, pins, SystemMatrix::RestStiffness, h, symbolic);
     let stiffening = |material: &DeformableMaterial| material.stiffening(h);
-    add_tangents(elements, x, projected, stiffening, |i, j, block| matrix.add_elastic(i, j, block));
+    add_tangents(elements, x, projected, stiffening, |i, j, block| {
+        if matrix.pinned[i] {
+            beside(i, j, block);
+        }
+        if matrix.pinned[j] && i != j {
+            beside(j, i, &block.transpose());
+        }
+        matrix.add_elastic(i, j, block);
+    });
     matrix.values
 }
 

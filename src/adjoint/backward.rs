@@ -1,0 +1,150 @@
+//! One step backward: the derivatives with respect to its end become those with respect to its start, and to all that acts in it.
+//!
+//! The end solves `F₁ = r(x′) + Jᵀλ = 0` and the laws of the contacts that bind, `F₂ = 0`. With `g = ∂L/∂x′ + ∂L/∂v′/h` and
+//! `H = −∂r/∂x′`, the adjoint z, q of section 14 of docs/method.md gives `dL/dθ = z·∂F₁/∂θ + q·∂F₂/∂θ`.
+
+use super::contact_rows::ContactRows;
+use super::gradient::{DeformableGradient, StepGradient};
+use super::parameters::{ElasticWork, Inertia};
+use super::record::{ContactRecord, StepRecord};
+use super::spin::{Cotangents, through_spin};
+use super::tangent::Tangent;
+use crate::fem::{DeformableModel, Elements};
+use crate::math::Vec3;
+
+/// What goes backward over the steps.
+pub(super) struct Backward<'a> {
+    model: &'a DeformableModel,
+    tangent: Tangent,
+    force: Vec<Vec3>,
+    /// With respect to the state between two steps.
+    pub x: Vec<Vec3>,
+    pub v: Vec<Vec3>,
+}
+
+impl<'a> Backward<'a> {
+    /// `None` for a mesh whose matrix cannot be put together.
+    pub fn new(model: &'a DeformableModel) -> Option<Self> {
+        let zeros = vec![Vec3::zeros(); model.rest.len()];
+        let tangent = Tangent::new(model)?;
+        Some(Self { model, tangent, force: Vec::new(), x: zeros.clone(), v: zeros })
+    }
+
+    /// Goes through a step, with what the loss says of the forces of colliders in it.
+    ///
+    /// # Errors
+    /// Why there is no gradient.
+    pub fn step(
+        &mut self,
+        record: &StepRecord,
+        of_colliders: &[(u64, Vec3)],
+        out: &mut DeformableGradient,
+    ) -> Result<(), &'static str> {
+        let (model, h) = (self.model, record.h);
+        let inertia = Inertia::new(model, &record.materials);
+        let mut of = Cotangents::new(std::mem::take(&mut self.x), std::mem::take(&mut self.v));
+        if record.keeps_spin {
+            through_spin(record, &inertia, &mut of);
+        }
+        let g: Vec<Vec3> = of.x_end.iter().zip(&of.v_end).map(|(x, v)| x + v / h).collect();
+        of.x_start.iter_mut().zip(&of.v_end).for_each(|(x, v)| *x -= v / h);
+        let (z, of_pins) = self.solve(record, &inertia, of_colliders, g, &mut of)?;
+        out.friction += of.friction;
+        add_inertia(record, &inertia, &z, &mut of);
+        let mut work = ElasticWork { model, record, z: &z, force: &mut self.force };
+        work.add_materials(&mut out.materials);
+        let activation = work.activation();
+        inertia.add_materials(model, record, (&of.masses, of.damping), &mut out.materials);
+        let users = |nodes: &[Vec3]| model.nodes_by_vertex().map(|n| nodes[n].into()).collect();
+        out.steps.push(StepGradient {
+            forces: users(&of.forces),
+            pin_targets: users(&of_pins),
+            gravity: of.gravity.into(),
+            activation,
+            velocities: users(&of.v_start),
+        });
+        (self.x, self.v) = (of.x_start, of.v_start);
+        Ok(())
+    }
+
+    /// Solves for z, and for what is with respect to the targets of pins; adds what contacts say of the start, and of friction.
+    fn solve(
+        &mut self,
+        record: &StepRecord,
+        inertia: &Inertia,
+        of_colliders: &[(u64, Vec3)],
+        mut g: Vec<Vec3>,
+        of: &mut Cotangents,
+    ) -> Result<(Vec<Vec3>, Vec<Vec3>), &'static str> {
+        let (stuck, others) = stuck_contacts(record);
+        let mut fixed = record.pins.clone();
+        fixed.extend(stuck.iter().map(|(node, _)| *node as u32));
+        fixed.sort_unstable();
+        let (mut is_free, mut of_fixed) = (vec![true; g.len()], vec![Vec3::zeros(); g.len()]);
+        for &node in &fixed {
+            is_free[node as usize] = false;
+            of_fixed[node as usize] = std::mem::take(&mut g[node as usize]);
+        }
+        let elements =
+            Elements { model: self.model, materials: &record.materials, activation: record.activation };
+        if !self.tangent.update(&elements, &record.x_end, &fixed, record.h) {
+            return Err("its stiffness has no inverse");
+        }
+        let mut z_stuck = vec![Vec3::zeros(); g.len()];
+        for (node, contact) in &stuck {
+            let own = of_colliders.iter().filter(|(collider, _)| *collider == contact.collider);
+            z_stuck[*node] = -own.map(|(_, derivative)| *derivative).sum::<Vec3>();
+        }
+        self.tangent.take_off_free(&z_stuck, &is_free, &mut g);
+        let rows = ContactRows::new(&others);
+        let share = rows.solve(&mut self.tangent, &is_free, of_colliders, &mut g);
+        let (share, mut z) = (share.ok_or("its contacts say too little or too much")?, g);
+        stuck.iter().for_each(|(node, _)| z[*node] = z_stuck[*node]);
+        self.tangent.take_off_pinned(&z, &mut of_fixed);
+        let held = (1.0 / record.h + inertia.damping) / record.h;
+        for (node, contact) in stuck {
+            let carried = of_fixed[node] - z[node] * (held * inertia.masses[node]);
+            let normal = contact.frame[0];
+            let along = normal * normal.dot(&carried);
+            of.x_start[node] += if contact.recovers { carried } else { carried - along };
+        }
+        let mut of_pins = vec![Vec3::zeros(); z.len()];
+        for pin in record.pins.iter().map(|&pin| pin as usize) {
+            of_pins[pin] = of_fixed[pin] + share.of_end[pin];
+        }
+        of.x_start.iter_mut().zip(&share.of_start).for_each(|(x, c)| *x += c);
+        of.friction = share.of_friction;
+        Ok((z, of_pins))
+    }
+}
+
+/// Nodes that stick with the only contact they have, and all other contacts.
+fn stuck_contacts(record: &StepRecord) -> (Vec<(usize, &ContactRecord)>, Vec<&ContactRecord>) {
+    let mut count = vec![0; record.x_end.len()];
+    record.contacts.iter().flat_map(ContactRecord::weighted_nodes).for_each(|(node, _)| count[node] += 1);
+    // What is led does not stick.
+    record.pins.iter().for_each(|&pin| count[pin as usize] = 2);
+    let (mut stuck, mut others) = (Vec::new(), Vec::new());
+    for contact in &record.contacts {
+        match contact.stuck_node().filter(|node| count[*node] == 1) {
+            Some(node) => stuck.push((node, contact)),
+            None => others.push(contact),
+        }
+    }
+    (stuck, others)
+}
+
+/// What z says of `m ((xₙ + h vₙ − x′)/h² + g − α (x′ − xₙ)/h) + f`.
+fn add_inertia(record: &StepRecord, inertia: &Inertia, z: &[Vec3], of: &mut Cotangents) {
+    let (h, alpha) = (record.h, inertia.damping);
+    for (i, (z, m)) in z.iter().zip(&inertia.masses).enumerate() {
+        let moved = record.x_end[i] - record.x_start[i];
+        of.x_start[i] += z * (m * (1.0 / (h * h) + alpha / h));
+        of.v_start[i] += z * (m / h);
+        of.forces[i] += z;
+        of.gravity += z * (m * record.gravity_scale);
+        let change = (record.v_start[i] - moved / h) / h;
+        of.masses[i] += z.dot(&(change + record.gravity * record.gravity_scale - moved * (alpha / h)));
+        of.damping -= m * z.dot(&moved) / h;
+    }
+}

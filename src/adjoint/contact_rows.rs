@@ -1,0 +1,145 @@
+//! The laws of the contacts that bind, `F₂(x′, λ) = 0`, row by row, and their part of the adjoint.
+//!
+//! With `J` the directions of the forces and `u` the slip, a contact that carries has the rows
+//! - `n·(x′ − xₙ) + gap = 0`,
+//! - if it sticks `t·(x′ − xₙ) = 0` for both tangents (beside what its partner moves),
+//! - if it slides `s (λ_t + μ λ_n û) = 0` with `û = u/|u|` and the constant `s = |u|/(μ λ_n)`, which makes metres of it.
+//!
+//! A node that sticks with its one contact moves by nothing but its partner: it is taken out of the unknowns as a pinned one is.
+//!
+//! With `C = ∂F₂/∂x′` and `D = ∂F₂/∂λ` the adjoint is `H z = g + Cᵀq`, `(J H⁻¹ Cᵀ + Dᵀ) q = −g_λ − J H⁻¹ g`. Normals, and the
+//! weights of points within triangles and edges, count as constant.
+
+use super::record::ContactRecord;
+use super::tangent::Tangent;
+use crate::math::Vec3;
+use nalgebra::{DMatrix, DVector};
+
+/// Singular value over the largest one below which contacts say the same as others.
+const REDUNDANT: f64 = 1.0e-11;
+/// What a solve of the contacts may leave of its right-hand side.
+const LEFT: f64 = 1.0e-8;
+
+/// A row: what its force acts along, and what its law looks along.
+struct Row<'a> {
+    contact: &'a ContactRecord,
+    acts: Vec3,
+    looks: Vec3,
+    /// Derivative of the law with respect to the position at the start, along what it looks along.
+    of_start: f64,
+    /// Derivative of the law with respect to the coefficient of friction.
+    of_friction: f64,
+}
+
+/// The rows of a step.
+pub(super) struct ContactRows<'a> {
+    rows: Vec<Row<'a>>,
+    /// D, by rows of the law and of the force.
+    of_forces: DMatrix<f64>,
+}
+
+/// What the contacts add to the derivatives.
+#[derive(Default)]
+pub(super) struct ContactShare {
+    /// `Cᵀq` by nodes, pinned ones too.
+    pub of_end: Vec<Vec3>,
+    pub of_start: Vec<Vec3>,
+    pub of_friction: f64,
+}
+
+impl<'a> ContactRows<'a> {
+    pub fn new(contacts: &[&'a ContactRecord]) -> Self {
+        let count = contacts.iter().map(|contact| contact.dimension()).sum();
+        let (mut rows, mut of_forces) = (Vec::with_capacity(count), DMatrix::zeros(count, count));
+        for &contact in contacts {
+            let first = rows.len();
+            let [normal, tangents @ ..] = contact.frame;
+            let of_start = if contact.recovers { -1.0 } else { 0.0 };
+            rows.push(Row { contact, acts: normal, looks: normal, of_start, of_friction: 0.0 });
+            for tangent in tangents.into_iter().take(contact.dimension() - 1) {
+                let mut row =
+                    Row { contact, acts: tangent, looks: tangent, of_start: -1.0, of_friction: 0.0 };
+                if let Some(slip) = contact.slip {
+                    let (length, pressed) = (slip.norm(), normal.dot(&contact.force));
+                    let direction = slip / length;
+                    let along = direction.dot(&tangent);
+                    let scale = length / (contact.friction * pressed);
+                    row.looks = tangent - direction * along;
+                    row.of_friction = scale * pressed * along;
+                    of_forces[(rows.len(), first)] = scale * contact.friction * along;
+                    of_forces[(rows.len(), rows.len())] = scale;
+                }
+                rows.push(row);
+            }
+        }
+        Self { rows, of_forces }
+    }
+
+    /// Solves for z in place of `g`, zero at pinned nodes, with the derivative of the loss with respect to the forces of colliders.
+    /// `None` if it cannot be.
+    pub fn solve(
+        &self,
+        tangent: &mut Tangent,
+        is_free: &[bool],
+        of_colliders: &[(u64, Vec3)],
+        g: &mut [Vec3],
+    ) -> Option<ContactShare> {
+        let (count, n) = (self.rows.len(), g.len());
+        let mut share = ContactShare { of_end: vec![Vec3::zeros(); n], ..Default::default() };
+        share.of_start = share.of_end.clone();
+        if count == 0 {
+            return solve_one(tangent, g).then_some(share);
+        }
+        // H⁻¹ Jᵀ.
+        let mut columns = vec![0.0; 3 * n * count];
+        for (row, column) in self.rows.iter().zip(columns.chunks_exact_mut(3 * n)) {
+            for (node, weight) in row.contact.weighted_nodes().filter(|(node, _)| is_free[*node]) {
+                (0..3).for_each(|k| column[3 * node + k] += weight * row.acts[k]);
+            }
+        }
+        tangent.solve(&mut columns).then_some(())?;
+        let columns: Vec<&[f64]> = columns.chunks_exact(3 * n).collect();
+        let mut matrix = self.of_forces.transpose();
+        let mut rhs = DVector::zeros(count);
+        for (a, (row, column)) in self.rows.iter().zip(&columns).enumerate() {
+            let at = |node: usize| Vec3::new(column[3 * node], column[3 * node + 1], column[3 * node + 2]);
+            for (b, other) in self.rows.iter().enumerate() {
+                let ends = other.contact.weighted_nodes().filter(|(node, _)| is_free[*node]);
+                matrix[(a, b)] += ends.map(|(node, weight)| weight * other.looks.dot(&at(node))).sum::<f64>();
+            }
+            let own = of_colliders.iter().filter(|(collider, _)| *collider == row.contact.collider);
+            let of_force: f64 = own.map(|(_, derivative)| derivative.dot(&row.acts)).sum();
+            rhs[a] = -of_force - g.iter().enumerate().map(|(node, g)| g.dot(&at(node))).sum::<f64>();
+        }
+        let q = solve_dense(matrix, &rhs)?;
+        for (row, q) in self.rows.iter().zip(&q) {
+            share.of_friction += q * row.of_friction;
+            for (node, weight) in row.contact.weighted_nodes() {
+                share.of_end[node] += row.looks * (weight * q);
+                share.of_start[node] += row.looks * (weight * q * row.of_start);
+            }
+        }
+        for ((g, c), _) in g.iter_mut().zip(&share.of_end).zip(is_free).filter(|(_, is_free)| **is_free) {
+            *g += c;
+        }
+        solve_one(tangent, g).then_some(share)
+    }
+}
+
+fn solve_one(tangent: &mut Tangent, g: &mut [Vec3]) -> bool {
+    let mut column: Vec<f64> = g.iter().flat_map(|v| [v.x, v.y, v.z]).collect();
+    let is_solved = tangent.solve(&mut column);
+    g.iter_mut().zip(column.chunks_exact(3)).for_each(|(g, v)| *g = Vec3::new(v[0], v[1], v[2]));
+    is_solved
+}
+
+/// By elimination, or, where contacts are as good as redundant, by the least solution of all.
+fn solve_dense(matrix: DMatrix<f64>, rhs: &DVector<f64>) -> Option<DVector<f64>> {
+    let left = |q: &DVector<f64>| (&matrix * q - rhs).amax();
+    let by_elimination = matrix.clone().lu().solve(rhs).filter(|q| left(q) <= LEFT * rhs.amax());
+    by_elimination.or_else(|| {
+        let svd = matrix.clone().svd(true, true);
+        let q = svd.solve(rhs, REDUNDANT * svd.singular_values.max()).ok()?;
+        (left(&q) <= LEFT * rhs.amax()).then_some(q)
+    })
+}

@@ -1,0 +1,94 @@
+//! Derivatives of a loss, as users read them.
+
+/// Derivatives of a loss with respect to the material of a region.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct MaterialGradient {
+    /// Per pascal of Young's modulus.
+    pub youngs_modulus: f64,
+    /// Of Poisson's ratio.
+    pub poisson_ratio: f64,
+    /// Per kg/m³ of density, with forces as they are.
+    pub density: f64,
+    /// Per 1/s of mass damping α.
+    pub mass_damping: f64,
+    /// Per pascal of the fibres' modulus.
+    pub fibre_modulus: f64,
+}
+
+/// Derivatives of a loss with respect to what acted on a body in one step.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct StepGradient {
+    /// Per newton on each vertex.
+    pub forces: Vec<[f64; 3]>,
+    /// Per metre of where each pinned vertex was led to; zero of others.
+    pub pin_targets: Vec<[f64; 3]>,
+    /// Per m/s² of the world's gravity.
+    pub gravity: [f64; 3],
+    /// Of the stretch that muscle fibres wanted to have.
+    pub activation: f64,
+    /// Per m/s that each vertex would have gained before the step.
+    pub velocities: Vec<[f64; 3]>,
+}
+
+/// Derivatives of a loss, of [`DeformableTape::backward`](crate::DeformableTape::backward).
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct DeformableGradient {
+    /// Per metre of where each vertex began, with pins led to where they were.
+    pub initial_positions: Vec<[f64; 3]>,
+    /// Per m/s with which each vertex began.
+    pub initial_velocities: Vec<[f64; 3]>,
+    /// With respect to the materials of all steps, in the order of [`DeformableModel::regions`](crate::DeformableModel::regions).
+    pub materials: Vec<MaterialGradient>,
+    /// Of the coefficients of friction of all contacts together.
+    pub friction: f64,
+    /// Step by step.
+    pub steps: Vec<StepGradient>,
+}
+
+impl DeformableGradient {
+    /// With respect to the one material of a body: the sum over its regions.
+    pub fn material(&self) -> MaterialGradient {
+        self.materials.iter().fold(MaterialGradient::default(), |sum, m| MaterialGradient {
+            youngs_modulus: sum.youngs_modulus + m.youngs_modulus,
+            poisson_ratio: sum.poisson_ratio + m.poisson_ratio,
+            density: sum.density + m.density,
+            mass_damping: sum.mass_damping + m.mass_damping,
+            fibre_modulus: sum.fibre_modulus + m.fibre_modulus,
+        })
+    }
+
+    /// Per m/s² of a gravity that was the same in all steps.
+    pub fn gravity(&self) -> [f64; 3] {
+        self.steps.iter().fold([0.0; 3], |sum, step| added(&sum, &step.gravity))
+    }
+
+    /// Of an activation that was the same in all steps.
+    pub fn activation(&self) -> f64 {
+        self.steps.iter().map(|step| step.activation).sum()
+    }
+
+    /// Per newton on each vertex of a force that was the same in all steps.
+    pub fn forces(&self) -> Vec<[f64; 3]> {
+        self.summed(|step| &step.forces)
+    }
+
+    /// Per metre of where each pinned vertex was held in all steps.
+    pub fn pin_targets(&self) -> Vec<[f64; 3]> {
+        self.summed(|step| &step.pin_targets)
+    }
+
+    fn summed(&self, of: impl Fn(&StepGradient) -> &Vec<[f64; 3]>) -> Vec<[f64; 3]> {
+        let mut sums = vec![[0.0; 3]; self.initial_positions.len()];
+        for step in &self.steps {
+            sums.iter_mut().zip(of(step)).for_each(|(sum, own)| *sum = added(sum, own));
+        }
+        sums
+    }
+}
+
+fn added(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}

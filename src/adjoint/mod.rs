@@ -1,0 +1,20 @@
+//! Gradients over steps: of a loss of where a body has been, how fast, and what it pressed, with respect to what it is made of, its
+//! loads, pins, activation and start. Every recorded step is the solution of `F(x′, λ) = 0`, its balance of forces and the laws of
+//! its contacts that bind; going backward takes one solve with the transpose of its derivative a step.
+
+mod checkpoint;
+mod contact_rows;
+mod gradient;
+mod loss;
+mod parameters;
+mod record;
+mod spin;
+mod tangent;
+
+mod backward;
+
+mod tape;
+
+pub use gradient::{DeformableGradient, MaterialGradient, StepGradient};
+pub use loss::DeformableLoss;
+pub use tape::DeformableTape;

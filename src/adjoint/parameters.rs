@@ -1,0 +1,135 @@
+//! Derivatives of the elastic forces with respect to material and activation, at positions held fast: differences of the forces
+//! themselves, so that they hold for every energy. In moduli and activation forces are linear, and differences exact, but where
+//! regions meet: there they are of the fourth order. Those of Poisson's ratio are small.
+
+use super::gradient::MaterialGradient;
+use super::record::StepRecord;
+use crate::fem::elastic_forces::{Evaluation, add_forces};
+use crate::fem::{DeformableModel, Elements, StiffnessDamping};
+use crate::material::DeformableMaterial;
+use crate::math::{Mat3, Vec3, dot};
+
+/// Differences of moduli, relative to Young's, and of activation.
+const DIFFERENCE: f64 = 1.0e-3;
+/// Of Poisson's ratio, relative to its distance from a half: squared the error of the difference, 1e-16 over it that of rounding.
+const POISSON: f64 = 1.0e-5;
+
+/// Places and weights of a derivative: between two, four, and of five to one side.
+const LINEAR: &[(f64, f64)] = &[(1.0, 0.5), (-1.0, -0.5)];
+const CENTRAL: &[(f64, f64)] =
+    &[(1.0, 2.0 / 3.0), (-1.0, -2.0 / 3.0), (2.0, -1.0 / 12.0), (-2.0, 1.0 / 12.0)];
+const FORWARD: &[(f64, f64)] =
+    &[(0.0, -25.0 / 12.0), (1.0, 4.0), (2.0, -3.0), (3.0, 4.0 / 3.0), (4.0, -0.25)];
+
+/// Virtual work of the elastic forces of a step along z, by materials and activation.
+pub(super) struct ElasticWork<'a> {
+    pub model: &'a DeformableModel,
+    pub record: &'a StepRecord,
+    pub z: &'a [Vec3],
+    pub force: &'a mut Vec<Vec3>,
+}
+
+impl ElasticWork<'_> {
+    fn of(&mut self, materials: &[DeformableMaterial], activation: f64) -> f64 {
+        self.force.clear();
+        self.force.resize(self.z.len(), Vec3::zeros());
+        let elements = Elements { model: self.model, materials, activation };
+        let (damping, frame) = (StiffnessDamping::default(), Mat3::identity());
+        let x = &self.record.x_end;
+        let at = Evaluation { damping: &damping, x, frame: &frame, limit: f64::INFINITY };
+        add_forces(&elements, &at, self.force);
+        dot(self.force, self.z)
+    }
+
+    /// The derivative with respect to what `set` changes of the material of a region, by differences of `by`.
+    fn along(
+        &mut self,
+        region: usize,
+        by: f64,
+        scheme: &[(f64, f64)],
+        set: impl Fn(&mut DeformableMaterial, f64),
+    ) -> f64 {
+        let mut materials = self.record.materials.clone();
+        let mut sum = 0.0;
+        for (place, weight) in scheme {
+            materials[region] = self.record.materials[region];
+            set(&mut materials[region], place * by);
+            sum += weight * self.of(&materials, self.record.activation);
+        }
+        sum / by
+    }
+
+    /// Adds the derivatives with respect to what is elastic in the materials.
+    pub fn add_materials(&mut self, out: &mut [MaterialGradient]) {
+        // Of one material without fibres all forces are in proportion to it.
+        let moduli = match (out.len(), self.model.has_fibres()) {
+            (1, false) => &[],
+            (1, true) => LINEAR,
+            _ => CENTRAL,
+        };
+        for (region, out) in out.iter_mut().enumerate() {
+            let DeformableMaterial { youngs_modulus, poisson_ratio, .. } = self.record.materials[region];
+            let by = DIFFERENCE * youngs_modulus;
+            out.youngs_modulus += if moduli.is_empty() {
+                self.of(&self.record.materials, self.record.activation) / youngs_modulus
+            } else {
+                self.along(region, by, moduli, |m, d| m.youngs_modulus += d)
+            };
+            let apart = POISSON * (0.5 - poisson_ratio);
+            // Below nought smoothed elements have no volume to keep.
+            let scheme = if poisson_ratio > apart { LINEAR } else { FORWARD };
+            out.poisson_ratio += self.along(region, apart, scheme, |m, d| m.poisson_ratio += d);
+            if self.model.has_fibres() {
+                out.fibre_modulus += self.along(region, by, LINEAR, |m, d| m.fibre_modulus += d);
+            }
+        }
+    }
+
+    /// With respect to the activation.
+    pub fn activation(&mut self) -> f64 {
+        if !self.model.has_fibres() {
+            return 0.0;
+        }
+        let (record, mut sum) = (self.record, 0.0);
+        for (place, weight) in LINEAR {
+            sum += weight * self.of(&record.materials, record.activation + place * DIFFERENCE);
+        }
+        sum / DIFFERENCE
+    }
+}
+
+/// What masses and damping of the nodes follow from.
+pub(super) struct Inertia {
+    pub masses: Vec<f64>,
+    /// α [1/s].
+    pub damping: f64,
+}
+
+impl Inertia {
+    pub fn new(model: &DeformableModel, materials: &[DeformableMaterial]) -> Self {
+        let masses = model.weigh_nodes(materials, |material| material.density);
+        Self { masses, damping: model.mass_damping(materials) }
+    }
+
+    /// Adds what derivatives with respect to masses and damping come to.
+    pub fn add_materials(
+        &self,
+        model: &DeformableModel,
+        record: &StepRecord,
+        (of_masses, of_damping): (&[f64], f64),
+        out: &mut [MaterialGradient],
+    ) {
+        let materials = &record.materials;
+        let mass = model.weigh(materials, |material| material.density);
+        for (region, out) in out.iter_mut().enumerate() {
+            let mut alone: Vec<_> = materials.iter().map(|material| material.density(0.0)).collect();
+            alone[region].density = 1.0;
+            let per_density = model.weigh_nodes(&alone, |material| material.density);
+            let volume = model.weigh(&alone, |material| material.density);
+            out.density += of_masses.iter().zip(per_density).map(|(a, b)| a * b).sum::<f64>();
+            let DeformableMaterial { density, mass_damping, .. } = materials[region];
+            out.density += of_damping * volume * (mass_damping - self.damping) / mass;
+            out.mass_damping += of_damping * volume * density / mass;
+        }
+    }
+}

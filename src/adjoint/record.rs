@@ -1,0 +1,174 @@
+//! What is kept of a step so that it can be gone through backward, and which steps cannot be.
+
+use crate::body::{ConstraintKey, DeformableBody, Integrator};
+use crate::contact::{Endpoint, Law};
+use crate::material::DeformableMaterial;
+use crate::math::Vec3;
+use crate::pipeline::{SolvedBody, SolvedContact};
+use rapier3d::dynamics::RigidBodyType;
+
+/// Residual over the forces, and error of contact forces over the largest of them, up to which a step counts as solved: what is
+/// left of it is an error of the gradient.
+const SOLVED: f64 = 1.0e-6;
+/// Distance of a contact that carries from where it is to end, over the mean edge, up to which it counts as solved: what the
+/// iteration of the shifts has left.
+const SETTLED: f64 = 1.0e-6;
+/// Part of the limit of friction from which on a contact slides.
+const SLIDES: f64 = 1.0 - 1.0e-6;
+/// Turn \[rad\] in a step of which the loss is seen, if it is given back.
+const TURNS: f64 = 0.1;
+
+/// A step of one body.
+#[derive(Clone, Debug)]
+pub(super) struct StepRecord {
+    pub h: f64,
+    /// Nodes that were led along.
+    pub pins: Vec<u32>,
+    pub x_start: Vec<Vec3>,
+    pub v_start: Vec<Vec3>,
+    pub x_end: Vec<Vec3>,
+    pub materials: Vec<DeformableMaterial>,
+    pub activation: f64,
+    /// Of the world [m/s²], and the body's factor on it.
+    pub gravity: Vec3,
+    pub gravity_scale: f64,
+    /// On the nodes \[N\]; empty while there are none.
+    pub forces: Vec<Vec3>,
+    pub contacts: Vec<ContactRecord>,
+    /// What the step has lost of the angular momentum was given back.
+    pub keeps_spin: bool,
+}
+
+/// A contact that carried.
+#[derive(Clone, Debug)]
+pub(super) struct ContactRecord {
+    pub collider: u64,
+    pub nodes: [u32; 3],
+    pub weights: [f64; 3],
+    /// Normal and two tangents.
+    pub frame: [Vec3; 3],
+    /// On the body \[N\].
+    pub force: Vec3,
+    pub friction: f64,
+    /// Of the body along the surface \[m\], where it slid.
+    pub slip: Option<Vec3>,
+    /// An overlap that was not to be recovered altogether: where the node ends depends on where it began.
+    pub recovers: bool,
+}
+
+impl StepRecord {
+    /// Of the last step of a body, under this gravity [m/s²].
+    ///
+    /// # Errors
+    /// Why there is no gradient.
+    pub fn new(body: &DeformableBody, solved: &SolvedBody<'_>, gravity: Vec3) -> Result<Self, &'static str> {
+        check_body(body)?;
+        let problem = solved.problem;
+        let carries = |contact: &&SolvedContact<'_>| contact.force != Vec3::zeros();
+        let contacts = solved.contacts.iter().filter(carries).map(ContactRecord::new);
+        let contacts = contacts.collect::<Result<_, _>>()?;
+        check_step(body, solved)?;
+        let turn = Vec3::from(body.angvel()).norm() * problem.h();
+        let is_mean = (0..body.state.v.len()).all(|n| body.state.v[n] == problem.mean_velocity(n));
+        let is_free = solved.in_flight && problem.key.pins.is_empty() && problem.settings.keeps_spin;
+        // Beyond half a radian in a step nothing is given back.
+        let keeps_spin = is_free && !(is_mean && turn > TURNS);
+        if !keeps_spin && !is_mean {
+            return Err("spin was given back in contact: it has to be without `keeps_spin`");
+        }
+        Ok(Self {
+            h: problem.h(),
+            pins: problem.key.pins.clone(),
+            x_start: problem.x_start.clone(),
+            v_start: problem.v_start.clone(),
+            x_end: body.state.x.clone(),
+            materials: body.materials.clone(),
+            activation: body.activation,
+            gravity,
+            gravity_scale: body.gravity_scale(),
+            forces: body.forces.clone(),
+            contacts,
+            keeps_spin,
+        })
+    }
+}
+
+fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
+    let resists = |m: &DeformableMaterial| m.stiffness_damping != 0.0 || m.branch_count() > 0;
+    let why = [
+        (body.is_sleeping(), "the body sleeps: it has to be without `can_sleep`"),
+        (body.body_type() != RigidBodyType::Dynamic, "the body is not dynamic"),
+        (body.settings().integrator != Integrator::ImplicitEuler, "only implicit Euler has one"),
+        (body.materials.iter().any(resists), "stiffness damping and Maxwell branches have none"),
+        (body.fillings.iter().any(Option::is_some), "filled cavities have none"),
+        (body.wind().is_some(), "wind has none"),
+    ];
+    why.iter().find(|(is_so, _)| *is_so).map_or(Ok(()), |(_, what)| Err(*what))
+}
+
+fn check_step(body: &DeformableBody, solved: &SolvedBody<'_>) -> Result<(), &'static str> {
+    let problem = solved.problem;
+    let is_solved = problem.residual() <= SOLVED * problem.force_scale() && solved.contact_error <= SOLVED;
+    let carries = |contact: &&SolvedContact<'_>| contact.force != Vec3::zeros();
+    let end = |c: &SolvedContact<'_>| c.constraint.frame[0].dot(&c.motion) + c.constraint.target_gap;
+    let near = SETTLED * body.model.surface.mean_edge;
+    let is_settled = solved.contacts.iter().filter(carries).all(|contact| end(contact).abs() <= near);
+    let why = [
+        (problem.is_rejected, "it was rejected"),
+        (!is_solved, "it was not solved: `tolerance` and `max_iterations` have to be stricter"),
+        (!is_settled, "its contacts have not settled: a smaller step, or less friction, may help"),
+        (body.state.x != problem.current.x, "the body was stopped at an obstacle"),
+        (!problem.impacts.is_empty(), "restitution has none"),
+    ];
+    why.iter().find(|(is_so, _)| *is_so).map_or(Ok(()), |(_, what)| Err(*what))
+}
+
+impl ContactRecord {
+    fn new(contact: &SolvedContact<'_>) -> Result<Self, &'static str> {
+        let constraint = contact.constraint;
+        let ConstraintKey::Obstacle(key) = constraint.key else {
+            return Err("contacts with deformable bodies, attachments that yield and cables have none");
+        };
+        let (Law::Contact { friction }, Endpoint::Soft { nodes, weights, .. }, true) =
+            (constraint.law, &constraint.endpoints[0], contact.is_on_prescribed)
+        else {
+            return Err("contacts with rigid bodies that yield have none");
+        };
+        if constraint.compliance != 0.0 || constraint.restitution != 0.0 {
+            return Err("contacts that give way, and restitution, have none");
+        }
+        let [normal, ..] = constraint.frame;
+        let along = |v: &Vec3| v - normal * normal.dot(v);
+        let (pressed, rubbed, slip) =
+            (normal.dot(&contact.force), along(&contact.force).norm(), along(&contact.motion));
+        let slides = friction > 0.0 && rubbed >= SLIDES * friction * pressed && slip != Vec3::zeros();
+        Ok(Self {
+            collider: key.collider,
+            nodes: *nodes,
+            weights: *weights,
+            frame: constraint.frame,
+            force: contact.force,
+            friction,
+            slip: slides.then_some(slip),
+            recovers: constraint.target_gap != constraint.gap,
+        })
+    }
+
+    /// Number of its rows.
+    pub fn dimension(&self) -> usize {
+        if self.friction > 0.0 { 3 } else { 1 }
+    }
+
+    /// The one node that it acts on, if it sticks.
+    pub fn stuck_node(&self) -> Option<usize> {
+        let mut nodes = self.weighted_nodes();
+        let (node, _) = nodes.next()?;
+        (self.friction > 0.0 && self.slip.is_none() && nodes.next().is_none()).then_some(node)
+    }
+
+    /// The nodes that it acts on, with their weights.
+    pub fn weighted_nodes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let pairs = self.nodes.iter().zip(self.weights).filter(|(_, weight)| *weight != 0.0);
+        pairs.map(|(node, weight)| (*node as usize, weight))
+    }
+}

@@ -1,0 +1,63 @@
+//! What the last step has solved of one body, for what asks afterwards how it came about.
+
+use super::scratch::StepScratch;
+use crate::body::DeformableBodyHandle;
+use crate::contact::{Constraint, Endpoint};
+use crate::math::Vec3;
+use crate::solver::BodyProblem;
+
+/// A body as its island left it, and what it may have touched.
+pub(crate) struct SolvedBody<'a> {
+    pub problem: &'a BodyProblem,
+    pub contacts: Vec<SolvedContact<'a>>,
+    /// Nothing was in its island's contact problem.
+    pub in_flight: bool,
+    /// Of the contact forces, over the largest of them.
+    pub contact_error: f64,
+}
+
+/// A constraint of the problem that acts on the body.
+pub(crate) struct SolvedContact<'a> {
+    pub constraint: &'a Constraint,
+    /// On endpoint 0 \[N\].
+    pub force: Vec3,
+    /// Motion of endpoint 0 against the surface at endpoint 1 over the step \[m\].
+    pub motion: Vec3,
+    /// Endpoint 0 is the body's, and endpoint 1 goes where it is led.
+    pub is_on_prescribed: bool,
+}
+
+impl StepScratch {
+    /// `None` of a body that was not stepped.
+    pub fn solved(&self, handle: DeformableBodyHandle) -> Option<SolvedBody<'_>> {
+        let work = self.islands.iter().find(|work| work.handles.contains(&handle))?;
+        let local = work.handles.iter().position(|own| *own == handle)?;
+        let problem = self.idle.get(&handle)?.problem.as_ref()?;
+        let contacts = &work.island.contacts;
+        let acts = |constraint: &Constraint| constraint.all_endpoints().any(|end| end.is_of(local));
+        let own = contacts.active.iter().filter(|contact| acts(&contact.constraint));
+        let solved = own.map(|contact| {
+            let constraint = &contact.constraint;
+            let moved = |endpoint: &Endpoint| match endpoint {
+                Endpoint::Soft { .. } if endpoint.is_of(local) => {
+                    endpoint.interpolate(&problem.current.x) - endpoint.interpolate(&problem.x_start)
+                }
+                _ => self.scene.proxies.displacement(endpoint, &self.reaction_list, problem.dt()),
+            };
+            let [body, partner] = &constraint.endpoints;
+            let is_led = |proxy| self.scene.proxies.get(proxy).prescribed().is_some();
+            SolvedContact {
+                constraint,
+                force: contact.force(&contacts.lambda),
+                motion: constraint.relative(moved) - constraint.surface_motion,
+                is_on_prescribed: body.is_of(local) && partner.proxy().is_some_and(is_led),
+            }
+        });
+        Some(SolvedBody {
+            problem,
+            contacts: solved.collect(),
+            in_flight: contacts.active.is_empty(),
+            contact_error: work.island.report.contacts.error,
+        })
+    }
+}

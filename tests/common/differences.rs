@@ -1,0 +1,272 @@
+//! Runs whose losses are differentiated twice: by a tape, and by differences between whole runs.
+#![allow(dead_code)]
+
+use foible3d::prelude::*;
+use rapier3d::prelude::*;
+
+/// What a run depends on.
+#[derive(Clone, Copy, Debug)]
+pub struct Run {
+    pub material: DeformableMaterial,
+    pub gravity: f64,
+    /// Force along z \[N\] on the tip.
+    pub push: f64,
+    /// Velocity along y [m/s] of the tip at first, and its shift along z \[m\].
+    pub throw: f64,
+    pub place: f64,
+    /// Velocity of all vertices along x and y.
+    pub launch: [f64; 2],
+    /// Velocity of the pins along z [m/s].
+    pub lead: f64,
+    pub activation: f64,
+    /// Of the floor; none if there is no friction.
+    pub friction: f64,
+}
+
+impl Run {
+    pub fn of(material: DeformableMaterial) -> Self {
+        Self {
+            material,
+            gravity: -9.75,
+            push: 0.5,
+            throw: 0.25,
+            place: 0.001953125,
+            launch: [0.0; 2],
+            lead: 0.25,
+            activation: 1.0,
+            friction: 0.0,
+        }
+    }
+}
+
+/// What is run.
+#[derive(Clone)]
+pub struct Scene {
+    pub builder: DeformableBodyBuilder,
+    pub steps: usize,
+    /// Height of a floor.
+    pub floor: Option<f32>,
+    pub regions: Vec<(u32, f64)>,
+    pub keeps_spin: bool,
+    /// The step whose contact force is looked at: what lies on a floor still settles then.
+    pub look: usize,
+    /// Of all differences.
+    pub stride: f64,
+}
+
+/// What came of a run.
+pub struct Outcome {
+    pub loss: f64,
+    pub tape: DeformableTape,
+    pub seeds: DeformableLoss,
+    pub tip: usize,
+    pub h: f64,
+    pub contact_force: [f64; 3],
+    pub floor: Option<ColliderHandle>,
+}
+
+/// Numbers without a pattern.
+fn weight(k: usize) -> f64 {
+    ((k * 7919 + 13) % 101) as f64 / 50.0 - 1.0
+}
+
+fn add_floor(physics: &mut PhysicsWorld, height: f32, friction: f64) -> ColliderHandle {
+    let slab = ColliderBuilder::cuboid(50.0, 1.0, 50.0).friction(friction as f32);
+    let slab = slab.friction_combine_rule(CoefficientCombineRule::Max);
+    physics.insert(RigidBodyBuilder::fixed().translation(Vector::Y * (height - 1.0)), slab).1
+}
+
+impl Scene {
+    pub fn new(builder: DeformableBodyBuilder) -> Self {
+        Self { builder, steps: 30, floor: None, regions: Vec::new(), keeps_spin: false, look: 7, stride: 1.0 }
+    }
+
+    pub fn is_sheet(&self) -> bool {
+        self.builder.clone().build().unwrap().model().surface_triangles().len() > 0
+    }
+
+    pub fn run(&self, run: &Run) -> Outcome {
+        let mut physics = PhysicsWorld::new();
+        physics.gravity = Vector::Y * run.gravity as f32;
+        let floor = self.floor.map(|height| add_floor(&mut physics, height, run.friction));
+        let mut world = DeformableWorld::new();
+        let builder = self.builder.clone().material(run.material).can_sleep(false);
+        let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
+        let handle = world
+            .insert(builder.settings(settings.contact_tolerance(1e-12).keeps_spin(self.keeps_spin)))
+            .unwrap();
+        let body = &mut world.bodies[handle];
+        for (region, modulus) in &self.regions {
+            body.set_region_material(*region, run.material.youngs_modulus(*modulus)).unwrap();
+        }
+        let far = |v: &usize| body.position(*v).unwrap()[0];
+        let tip = (0..body.vertex_count()).max_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
+        let [x, y, z] = body.position(tip).unwrap();
+        body.set_position(tip, [x, y, z + run.place]).unwrap();
+        for vertex in 0..body.vertex_count() {
+            let y = run.launch[1] + if vertex == tip { run.throw } else { 0.0 };
+            body.set_velocity(vertex, Vector::new(run.launch[0] as f32, y as f32, 0.0)).unwrap();
+        }
+        body.add_force(&[tip], Vector::Z * run.push as f32).unwrap();
+        body.set_activation(run.activation);
+        for vertex in body.pinned().collect::<Vec<_>>() {
+            body.set_velocity(vertex, Vector::ZERO).unwrap();
+            body.set_pin_velocity(vertex, Vector::Z * run.lead as f32).unwrap();
+        }
+        let mut tape = DeformableTape::new(&world, handle).unwrap();
+        let mut losses = Vec::new();
+        for step in 0..self.steps {
+            tape.step(&mut physics, &mut world).unwrap();
+            if step + 1 == self.steps || step + 1 == self.steps / 2 {
+                let body = &world.bodies[handle];
+                let at = |v: usize| (body.position(v).unwrap(), body.velocity(v).unwrap());
+                losses.push((step, (0..body.vertex_count()).map(at).collect::<Vec<_>>()));
+            }
+        }
+        let (mut loss, mut seeds) = (0.0, tape.loss());
+        for (step, states) in losses {
+            for (vertex, (x, v)) in states.into_iter().enumerate() {
+                let (a, b) = (
+                    [0, 1, 2].map(|k| weight(3 * vertex + k)),
+                    [0, 1, 2].map(|k| 0.02 * weight(5 * vertex + k)),
+                );
+                // Squares too: derivatives that depend on where it is.
+                loss += (0..3).map(|k| a[k] * x[k] + 0.5 * x[k] * x[k] + b[k] * v[k]).sum::<f64>();
+                seeds.add_position(step, vertex, [0, 1, 2].map(|k| a[k] + x[k])).unwrap();
+                seeds.add_velocity(step, vertex, b).unwrap();
+            }
+        }
+        let contact_force = floor.map_or([0.0; 3], |floor| tape.contact_force(self.look, floor));
+        let h = f64::from(physics.integration_parameters.dt);
+        Outcome { loss, tape, seeds, tip, h, contact_force, floor }
+    }
+}
+
+/// A number that a run depends on, with what its difference is to be and the tape's derivative.
+#[derive(Clone, Copy)]
+pub struct Parameter {
+    pub name: &'static str,
+    pub by: f64,
+    pub change: fn(&mut Run, f64),
+    pub of: fn(&DeformableGradient, &Outcome) -> f64,
+}
+
+pub const MATERIAL: [Parameter; 4] = [
+    Parameter {
+        name: "Young's modulus",
+        by: 64.0,
+        change: |run, d| run.material.youngs_modulus += d,
+        of: |g, _| g.material().youngs_modulus,
+    },
+    Parameter {
+        name: "Poisson's ratio",
+        by: 1e-3,
+        change: |run, d| run.material.poisson_ratio += d,
+        of: |g, _| g.material().poisson_ratio,
+    },
+    Parameter {
+        name: "density",
+        by: 1.0,
+        change: |run, d| run.material.density += d,
+        of: |g, _| g.material().density,
+    },
+    Parameter {
+        name: "mass damping",
+        by: 0.01,
+        change: |run, d| run.material.mass_damping += d,
+        of: |g, _| g.material().mass_damping,
+    },
+];
+
+pub const LOADS: [Parameter; 4] = [
+    Parameter {
+        name: "gravity",
+        by: 0.0078125,
+        change: |run, d| run.gravity += d,
+        of: |g, _| g.gravity()[1],
+    },
+    Parameter {
+        name: "force",
+        by: 0.0078125,
+        change: |run, d| run.push += d,
+        of: |g, out| g.forces()[out.tip][2],
+    },
+    Parameter {
+        name: "initial velocity",
+        by: 0.0078125,
+        change: |run, d| run.throw += d,
+        of: |g, out| g.initial_velocities[out.tip][1],
+    },
+    Parameter {
+        name: "initial position",
+        by: 0.00006103515625,
+        change: |run, d| run.place += d,
+        of: |g, out| g.initial_positions[out.tip][2],
+    },
+];
+
+pub const PINS: Parameter = Parameter {
+    name: "pins",
+    by: 0.0078125,
+    change: |run, d| run.lead += d,
+    of: |g, out| {
+        let led = |(k, step): (usize, &StepGradient)| {
+            (k + 1) as f64 * out.h * step.pin_targets.iter().map(|target| target[2]).sum::<f64>()
+        };
+        g.steps.iter().enumerate().map(led).sum()
+    },
+};
+
+pub const ACTIVATION: Parameter = Parameter {
+    name: "activation",
+    by: 1e-3,
+    change: |run, d| run.activation += d,
+    of: |g, _| g.activation(),
+};
+
+pub const LAUNCH: Parameter = Parameter {
+    name: "launch",
+    by: 0.0078125,
+    change: |run, d| run.launch[0] += d,
+    of: |g, _| g.initial_velocities.iter().map(|v| v[0]).sum(),
+};
+
+pub const FRICTION: Parameter = Parameter {
+    name: "friction",
+    by: 0.0009765625,
+    change: |run, d| run.friction += d,
+    of: |g, _| g.friction,
+};
+
+/// The largest relative error of the tape's derivatives against differences of the fourth order between whole runs.
+pub fn largest_error<'a>(
+    scene: &Scene,
+    run: &Run,
+    loss: &dyn Fn(&Outcome) -> f64,
+    seeds: &dyn Fn(&Outcome) -> DeformableLoss,
+    parameters: impl IntoIterator<Item = &'a Parameter>,
+) -> f64 {
+    let out = scene.run(run);
+    let gradient = out.tape.backward(&seeds(&out)).unwrap();
+    let mut largest = 0.0_f64;
+    for parameter in parameters {
+        let by = parameter.by * scene.stride;
+        let at = |d: f64| {
+            let mut changed = *run;
+            (parameter.change)(&mut changed, d * by);
+            loss(&scene.run(&changed))
+        };
+        let slope = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * by);
+        let ours = (parameter.of)(&gradient, &out);
+        let error = (ours / slope - 1.0).abs();
+        println!("  {}: {ours:.9e} against {slope:.9e}, {error:.1e}", parameter.name);
+        // NaN must not vanish in a maximum.
+        largest = if error.is_nan() { f64::INFINITY } else { largest.max(error) };
+    }
+    largest
+}
+
+/// As [`largest_error`], of the loss that a run has.
+pub fn state_error<'a>(scene: &Scene, run: &Run, parameters: impl IntoIterator<Item = &'a Parameter>) -> f64 {
+    largest_error(scene, run, &|out| out.loss, &|out| out.seeds.clone(), parameters)
+}
