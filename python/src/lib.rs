@@ -42,6 +42,7 @@ mod recording;
 mod rigid;
 mod rigid_builder;
 mod rigid_forces;
+mod robot;
 mod sets;
 mod signals;
 mod snapshots;
@@ -95,6 +96,8 @@ mod native {
     use crate::rigid::PyRigidBody;
     #[pymodule_export]
     use crate::rigid_builder::PyRigidBodyBuilder;
+    #[pymodule_export]
+    use crate::robot::PyRobot;
     #[pymodule_export]
     use crate::sets::{
         AttachmentSet, CableSet, ColliderSet, DeformableBodySet, ImpulseJointSet, RigidBodySet,

@@ -11,6 +11,10 @@ const VERSION: u32 = 2;
 
 /// A world as bytes.
 pub fn save(inner: &Inner) -> PyResult<Vec<u8>> {
+    if !inner.robots.is_empty() {
+        let why = "the world cannot be saved: it has robots from files, and which of their pairs do not touch is not part of a snapshot";
+        return Err(SnapshotError::new_err(why));
+    }
     let mut bytes = MAGIC.to_vec();
     bytes.extend(VERSION.to_le_bytes());
     let both = (&inner.physics, &inner.deformables);
@@ -34,7 +38,7 @@ pub fn load(bytes: &[u8]) -> PyResult<Inner> {
         ));
     }
     match postcard::take_from_bytes(rest) {
-        Ok(((physics, deformables), [])) => Ok(Inner { physics, deformables }),
+        Ok(((physics, deformables), [])) => Ok(Inner { physics, deformables, robots: Vec::new() }),
         Ok((_, left)) => refused(format!("{} bytes are left behind the snapshot", left.len())),
         Err(error) => refused(format!("the snapshot is damaged: {error}")),
     }

@@ -2,12 +2,13 @@
 
 use crate::arrays::{Array1, Triple, count, number, vector};
 use crate::errors::{Failure, bad_value, raised, without_panic};
-use foible3d::DeformableWorld;
+use foible_robots::Robot;
+use foible3d::{DeformableHooks, DeformableWorld};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
 use rapier3d::pipeline::PhysicsWorld;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// What a world holds.
@@ -17,12 +18,15 @@ pub struct Inner {
     pub physics: PhysicsWorld,
     /// Deformable bodies and attachments.
     pub deformables: DeformableWorld,
+    /// Robots from files, whose hooks keep their parts and links apart.
+    pub robots: Vec<Arc<Robot>>,
 }
 
 impl Inner {
     /// So many steps.
     pub fn step(&mut self, n: usize) {
-        (0..n).for_each(|_| self.deformables.step(&mut self.physics));
+        let Self { physics, deformables, robots } = self;
+        (0..n).for_each(|_| step_with(robots, physics, deformables, &()));
     }
 
     /// So many steps, where threads are those of this process.
@@ -32,6 +36,19 @@ impl Inner {
             false => self.step(n),
         }
         Ok(())
+    }
+}
+
+/// One step with the hooks of all robots.
+fn step_with(
+    robots: &[Arc<Robot>],
+    physics: &mut PhysicsWorld,
+    deformables: &mut DeformableWorld,
+    hooks: &dyn DeformableHooks,
+) {
+    match robots.split_first() {
+        None => deformables.step_with_events(physics, hooks, &()),
+        Some((first, others)) => step_with(others, physics, deformables, &first.hooks().beside(hooks)),
     }
 }
 
