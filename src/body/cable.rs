@@ -339,7 +339,7 @@ impl DeformableCable {
         are_guides
             && fits
             && lengths.chain([self.friction, self.compliance]).all(in_range)
-            && self.tensions.iter().all(|t| t.is_finite())
+            && self.tensions.iter().copied().all(in_range)
             && self.speed >= 0.0
             && self.max_tension >= 0.0
     }

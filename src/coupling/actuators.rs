@@ -116,7 +116,25 @@ impl ActuatorSignal {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct DeformableActuators {
+    #[cfg_attr(feature = "serde-serialize", serde(deserialize_with = "sound"))]
     signals: BTreeMap<String, ActuatorSignal>,
+}
+
+/// Signals as they are read, if all of them could have been set.
+#[cfg(feature = "serde-serialize")]
+fn sound<'de, D: serde::Deserializer<'de>>(
+    deserializer: D,
+) -> Result<BTreeMap<String, ActuatorSignal>, D::Error> {
+    let signals: BTreeMap<String, ActuatorSignal> = serde::Deserialize::deserialize(deserializer)?;
+    for (name, signal) in &signals {
+        let [least, most] = signal.range;
+        let within = |value: f64| least <= value && value <= most;
+        let is_range = least.is_finite() && most.is_finite();
+        if !(is_range && within(signal.command) && within(signal.value) && signal.rate > 0.0) {
+            return Err(serde::de::Error::custom(format!("a number of the signal {name:?} is out of range")));
+        }
+    }
+    Ok(signals)
 }
 
 impl DeformableActuators {

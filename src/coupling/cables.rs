@@ -137,7 +137,8 @@ impl Path<'_> {
             let turn = before.angle(&after);
             let loss = 1.0 - (-self.cable.friction() * turn).exp();
             if loss > 0.0 {
-                let law = Law::Bounded { least: -tensions[guide] * loss, most: tensions[guide - 1] * loss };
+                let [before, after] = [tensions[guide - 1].max(0.0), tensions[guide].max(0.0)];
+                let law = Law::Bounded { least: -after * loss, most: before * loss };
                 let mut rubs = self.add(self.tightened(guide), 0.0, law, CablePart::Guide(guide as u32));
                 rubs.loss = loss;
                 constraints.push(rubs);
