@@ -55,7 +55,7 @@ fn a_box_is_carried_to_its_target() {
         let out = pick_and_place(solver, 1.2);
         println!("{solver:?}: missed by {} m, slip {} m/s, height {} m", out.missed, out.slip, out.height);
         assert!(out.height > HALF + 0.09, "{solver:?}: {} m", out.height);
-        assert!(out.missed < 0.01, "{solver:?}: {} m", out.missed);
-        assert!(out.slip < 1.0e-4, "{solver:?}: {} m/s", out.slip);
+        assert!(out.missed < 2.0e-4, "{solver:?}: {} m", out.missed);
+        assert!(out.slip < 3.0e-6, "{solver:?}: {} m/s", out.slip);
     }
 }

@@ -18,6 +18,7 @@ pub(super) struct ArticulatedLinks {
     pub multibody: MultibodyIndex,
     /// Number within the multibody, and body, by slot.
     pub links: Vec<(usize, RigidBodyHandle)>,
+    pub passive: Option<PassiveJoints>,
 }
 
 /// A multibody's dynamic links as proxies.
@@ -27,6 +28,7 @@ pub(super) struct ReadArticulation {
     pub proxies: Vec<RigidProxy>,
     /// As [`Articulation::blocks`](crate::solver::Articulation::blocks).
     pub blocks: Vec<Matrix6<f64>>,
+    pub passive: Option<PassiveJoints>,
 }
 
 /// Reads all dynamic links of a multibody as the articulation `number` of the step; `None` if rapier has not computed
@@ -54,7 +56,8 @@ pub(super) fn read_articulation(
     let count = links.len();
     let gravity = context.gravity_f32();
     let forces: Vec<Vector6<f64>> = links.iter().map(|(_, h)| external_wrench(sets, *h, gravity)).collect();
-    let free = passive.and_then(|passive| free_velocity(multibody, &links, &forces, context.h, &passive));
+    let free = passive.as_ref();
+    let free = free.and_then(|passive| free_velocity(multibody, &links, &forces, context.h, passive));
     let mut proxies = Vec::with_capacity(count);
     for (slot, &(_, handle)) in links.iter().enumerate() {
         let body = sets.bodies.get(handle)?;
@@ -74,7 +77,7 @@ pub(super) fn read_articulation(
         let com = from_real(current_mass_properties(sets.colliders, body).world_com);
         proxies.push(RigidProxy::Link { articulation: number, slot, com, twist, free });
     }
-    Some(ReadArticulation { links, proxies, blocks })
+    Some(ReadArticulation { links, proxies, blocks, passive })
 }
 
 /// `J_a M⁻¹ J_bᵀ` of all pairs of links, made symmetric: rapier's matrices are in single precision.
@@ -163,7 +166,7 @@ pub(super) fn write_articulations(
         for ((link, _), wrench) in read.links.iter().zip(&wrenches) {
             impulse += multibody.body_jacobian(*link).tr_mul(&wrench.map(|w| w as f32));
         }
-        let change = match PassiveJoints::of(multibody, dt, parts.substeps) {
+        let change = match &read.passive {
             Some(passive) => passive.kick(&impulse.map(f64::from)).map(|change| change.map(|c| c as f32)),
             None => multibody.inv_augmented_mass().solve(&impulse),
         };

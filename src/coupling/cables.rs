@@ -168,26 +168,26 @@ impl Path<'_> {
 
 /// Takes what the constraints of a cable have come to: `along` is the force of its part \[N\].
 pub(crate) fn note_cable_force(cable: &mut DeformableCable, part: CablePart, along: f64) {
-    let parts: Vec<_> = cable.points.windows(2).map(part_of).collect();
+    let direction = |cable: &DeformableCable, place: usize| {
+        let (_, direction) = self::part(&cable.points[place], &cable.points[place + 1]);
+        direction
+    };
     let tighten = |cable: &mut DeformableCable, end: usize| {
-        for (place, direction) in parts.iter().enumerate().take(end) {
+        for place in 0..end {
+            let force = direction(cable, place) * along;
             cable.tensions[place] += along;
-            cable.forces[place] += direction * along;
-            cable.forces[place + 1] -= direction * along;
+            cable.forces[place] += force;
+            cable.forces[place + 1] -= force;
         }
     };
     match part {
-        CablePart::Pull => tighten(cable, parts.len()),
+        CablePart::Pull => tighten(cable, cable.tensions.len()),
         CablePart::Guide(guide) => tighten(cable, guide as usize),
         CablePart::Across { part, axis } => {
             let part = part as usize;
-            let force = tangents(&parts[part])[axis as usize] * along;
+            let force = tangents(&direction(cable, part))[axis as usize] * along;
             cable.forces[part] += force;
             cable.forces[part + 1] -= force;
         }
     }
-}
-
-fn part_of(ends: &[Vec3]) -> Vec3 {
-    part(&ends[0], &ends[1]).1
 }

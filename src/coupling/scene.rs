@@ -133,11 +133,11 @@ impl RapierScene {
     }
 
     fn add_articulation(&mut self, multibody: MultibodyIndex, read: ReadArticulation) {
-        let ReadArticulation { links, proxies, blocks } = read;
+        let ReadArticulation { links, proxies, blocks, passive } = read;
         let own = proxies.into_iter().zip(&links);
         let ids = own.map(|(proxy, (_, handle))| self.add_proxy(proxy, *handle)).collect();
         self.proxies.articulations.push(Articulation { links: ids, blocks });
-        self.articulated.push(ArticulatedLinks { multibody, links });
+        self.articulated.push(ArticulatedLinks { multibody, links, passive });
     }
 
     /// Adds the proxy of a body.

@@ -36,39 +36,31 @@ impl ContactSystem {
     }
 
     fn follow_cable(&mut self, rows: std::ops::Range<usize>) -> bool {
-        let is_along = |c: &ActiveContact| c.constraint.loss > 0.0 || is_pull(c);
-        let along = |c: &&ActiveContact| is_along(c);
-        let mut after: f64 =
-            self.active[rows.clone()].iter().filter(along).map(|c| self.lambda[c.first]).sum();
-        let (mut before, mut is_off) = (after, false);
-        let largest = self.lambda_of(rows.clone());
-        // The pull acts on all; a guide on what is before it: from the first part on, less and less of them act.
+        // The pull acts on all of the cable, a guide on what is before it: from the first part on, less and less of them act.
+        let own = &self.active[rows.clone()];
+        let tightens = |c: &&ActiveContact| c.constraint.loss > 0.0 || is_pull(c);
+        let mut before: f64 = own.iter().filter(tightens).map(|c| self.lambda[c.first]).sum();
+        let largest: f64 = own.iter().map(|c| self.lambda[c.first].abs()).sum();
+        let mut is_off = false;
         for place in rows {
-            let contact = &self.active[place];
-            if contact.constraint.loss == 0.0 {
+            let ActiveContact { constraint, first, .. } = &mut self.active[place];
+            if constraint.loss == 0.0 {
                 continue;
             }
-            after = before - self.lambda[contact.first];
-            let loss = contact.constraint.loss;
-            let (least, most) = (-loss * after.max(0.0), loss * before.max(0.0));
+            let after = before - self.lambda[*first];
+            let (least, most) = (-constraint.loss * after.max(0.0), constraint.loss * before.max(0.0));
             before = after;
-            if let Law::Bounded { least: a, most: b } = contact.constraint.law
-                && ((a - least).abs().max((b - most).abs())) > LAG * largest
-            {
-                is_off = true;
-            }
             let law = Law::Bounded { least, most };
-            self.active[place].constraint.law = law;
+            let was = std::mem::replace(&mut constraint.law, law);
+            if let Law::Bounded { least: a, most: b } = was {
+                is_off |= (a - least).abs().max((b - most).abs()) > LAG * largest;
+            }
             self.dense.problem.laws[place] = law;
             if let Some(contact) = self.free.metric.contacts.get_mut(place) {
                 contact.law = law;
             }
         }
         is_off
-    }
-
-    fn lambda_of(&self, rows: std::ops::Range<usize>) -> f64 {
-        self.active[rows].iter().map(|c| self.lambda[c.first].abs()).sum()
     }
 
     /// Puts the columns of all constraints along paths into the W that was just made.
