@@ -105,3 +105,54 @@ fn soft_squeezed_between_two_free_rigid_boxes() {
         scene.settles(&format!("soft between rigid of 1 and {ratio}"));
     }
 }
+
+/// A stack of cubes of 0.4 m, from the floor up: `s` soft and `r` rigid ones of 0.64 kg, `S` and `R` of 10 000 times as much. How fast
+/// anything goes in the last second [m/s], and how deep it is then \[m\].
+fn stack_of_ten_thousand(kinds: &str, youngs_modulus: f64) -> [f64; 2] {
+    let (mut physics, _) = world_with_floor(1.0 / 60.0);
+    let (mut world, mut soft, mut rigid) = (DeformableWorld::new(), Vec::new(), Vec::new());
+    for (level, kind) in kinds.chars().enumerate() {
+        let density = if kind.is_lowercase() { 10.0 } else { 1e5 };
+        let at = Vector::Y * (0.2 + 0.4 * level as f32);
+        if kind.eq_ignore_ascii_case(&'s') {
+            let material = DeformableMaterial::new(youngs_modulus, 0.3).density(density);
+            let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [4; 3]).material(material);
+            soft.push(world.insert(cube.translation(at).can_sleep(false)).unwrap());
+        } else {
+            let body = RigidBodyBuilder::dynamic().translation(at).can_sleep(false);
+            let shape = ColliderBuilder::cuboid(0.2, 0.2, 0.2).density(density as f32);
+            rigid.push(physics.insert(body, shape).0);
+        }
+    }
+    let (mut fastest, mut deepest) = (0.0f64, 0.0f64);
+    for step in 0..420 {
+        world.step(&mut physics);
+        if step >= 360 {
+            let of_rigid = rigid.iter().map(|b| f64::from(physics.bodies[*b].linvel().length()));
+            let of_soft = soft.iter().map(|b| world.bodies[*b].max_speed());
+            fastest = of_rigid.chain(of_soft).fold(fastest, f64::max);
+            deepest = world.contacts().iter().map(|c| -c.gap).fold(deepest, f64::max);
+        }
+    }
+    [fastest, deepest]
+}
+
+#[test]
+fn what_is_ten_thousand_times_as_heavy_stands_on_stiff_bodies() {
+    for (kinds, youngs_modulus) in [
+        ("srR", 1e9),
+        ("rsR", 1e9),
+        ("rsR", 1e8),
+        ("RsrsR", 1e9),
+        ("srS", 1e9),
+        ("sRsR", 1e9),
+        ("srR", 1e8),
+        ("sR", 1e8),
+    ] {
+        let [fastest, deepest] = stack_of_ten_thousand(kinds, youngs_modulus);
+        println!("{kinds} of {youngs_modulus:e} Pa: {fastest:.1e} m/s, {deepest:.1e} m deep");
+        // Rapier's f32 positions, 6e-8 m apart, are 1e-5 m/s in a step: a soft cube of 1e9 Pa hands them on.
+        assert!(fastest < 2e-4, "{kinds} of {youngs_modulus:e} Pa: {fastest:e} m/s");
+        assert!(deepest < 1e-6, "{kinds} of {youngs_modulus:e} Pa: {deepest:e} m");
+    }
+}
