@@ -42,6 +42,18 @@ impl Cavity {
         volume(&self.triangles, x)
     }
 
+    /// Whether a place is within the room at rest: its walls cover the whole sphere of directions there, by the solid angles of
+    /// triangles [Van Oosterom & Strackee 1983].
+    pub fn holds(&self, place: &Vec3, rest: &[Vec3]) -> bool {
+        let angle = |nodes: &[u32; 3]| {
+            let [a, b, c] = nodes.map(|n| rest[n as usize] - place);
+            let [p, q, r] = [a, b, c].map(|v| v.norm());
+            let below = p * q * r + a.dot(&b) * r + b.dot(&c) * p + c.dot(&a) * q;
+            2.0 * a.dot(&b.cross(&c)).atan2(below)
+        };
+        self.triangles.iter().map(angle).sum::<f64>() > 2.0 * std::f64::consts::PI
+    }
+
     /// Adds `scale` times the derivative of the volume by the nodes' positions, \[m²\]: areas along normals, which sum to nothing.
     pub fn add_gradient(&self, x: &[Vec3], scale: f64, out: &mut [Vec3]) {
         let origin = self.triangles.first().map_or(Vec3::zeros(), |t| x[t[0] as usize]);
@@ -155,6 +167,15 @@ mod tests {
         assert_eq!(volumes(&hollow(&[[1, 1, 1]])), [0.008]);
         assert_eq!(volumes(&hollow(&[[1, 1, 1], [3, 1, 1]])), [0.008, 0.008]);
         assert_eq!(volumes(&hollow(&[[1, 1, 1], [2, 1, 1]])), [0.016]);
+        let two = hollow(&[[1, 1, 1], [3, 1, 1]]);
+        let found = |x: f64| two.cavity_at([x, 0.03, -0.02]);
+        let centres: Vec<f64> = two.cavities().map(|cavity| cavity.centre[0]).collect();
+        for x in [-0.2, 0.2] {
+            let expected = centres.iter().position(|c| (c - x).abs() < 1e-9);
+            assert!(expected.is_some() && found(x) == expected, "{x}: {:?}", found(x));
+        }
+        // In a wall, and outside.
+        assert_eq!((found(0.0), found(1.0), found(f64::NAN)), (None, None, None));
         // A mouth lets it out.
         assert!(volumes(&hollow(&[[1, 1, 1], [1, 2, 1]])).is_empty());
     }

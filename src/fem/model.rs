@@ -273,6 +273,23 @@ impl DeformableModel {
         self.cavities.iter().map(|cavity| cavity.describe(&self.rest))
     }
 
+    /// The closed room that a place of the rest shape is in, by its place among [`DeformableModel::cavities`]; the smallest of several.
+    /// It holds whatever the order of the rooms comes to, so it is how a room is named in code.
+    ///
+    /// ```
+    /// use foible3d::{DeformableBodyBuilder, TetMesh};
+    /// // Two chambers, each a cell of five.
+    /// let finger = TetMesh::cuboid([0.5, 0.3, 0.3], [5, 3, 3])?;
+    /// let in_chamber = |[x, y, z]: [f64; 3]| y.abs() < 0.1 && z.abs() < 0.1 && (x.abs() - 0.2).abs() < 0.1;
+    /// let finger = DeformableBodyBuilder::mesh(&finger.without(in_chamber)?).build()?;
+    /// let left = finger.model().cavity_at([-0.2, 0.0, 0.0]);
+    /// assert!(left.is_some() && left != finger.model().cavity_at([0.2, 0.0, 0.0]));
+    /// # Ok::<(), foible3d::DeformableBodyError>(())
+    /// ```
+    pub fn cavity_at(&self, place: [f64; 3]) -> Option<usize> {
+        self.cavities.iter().rposition(|cavity| cavity.holds(&place.into(), &self.rest))
+    }
+
     /// Nodes along each rod.
     pub(crate) fn rods(&self) -> impl Iterator<Item = Vec<u32>> + '_ {
         self.structure.rods().map(|points| points.iter().map(|&v| self.node_of_vertex[v as usize]).collect())
