@@ -287,6 +287,18 @@ pub(super) fn rotation(quantity: &'static str, value: Rotation) -> Result<(), Bo
 }
 
 /// A vector of the user's, widened if it is one.
+pub(super) fn in_range(
+    quantity: &'static str,
+    value: f64,
+    wanted: &'static str,
+    is_in: bool,
+) -> Result<(), BodyError> {
+    match is_in {
+        true => Ok(()),
+        false => Err(BodyError::OutOfRange { quantity, value, wanted }),
+    }
+}
+
 pub(super) fn finite(quantity: &'static str, value: Vector) -> Result<Vec3, BodyError> {
     match value.is_finite() {
         true => Ok(from_real(value)),
