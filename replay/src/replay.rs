@@ -1,42 +1,40 @@
-//! What a run looked like: surfaces, contact forces and stress, a few times a second.
+//! Frames of a world over time: surfaces, contact forces and stress.
 
-use crate::scene::Scene;
-use crate::stage::Stage;
+use crate::shapes::{self, Surface};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
-use serde::Serialize;
+use std::collections::HashSet;
 
-/// Triangles of a half-space reach so far from its middle, in sizes of the rest of the scene.
-const HALF_SPACE_REACH: f32 = 2.0;
-
-/// Pictures per second, and at least so many in all: a fall of 30 ms is looked at in slow motion.
-const RATE: f64 = 60.0;
-const LEAST_PICTURES: f64 = 120.0;
-
-/// Pictures per second that show a scene well, no more than it has steps.
-pub fn replay_rate(scene: &Scene) -> f64 {
-    let (steps, dt) = scene.steps();
-    RATE.max(LEAST_PICTURES / (steps as f64 * dt).max(dt)).min(1.0 / dt)
-}
+/// Shapes that are larger \[m\] do not tell how large the scene is.
+const ENDLESS: f32 = 1.0e4;
 
 /// A mesh of a replay.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct ReplayMesh {
     /// The body's.
     pub name: String,
-    /// Whether its vertices move by themselves; else the body has a pose.
+    /// Whether its vertices move by themselves; else it has a pose.
     pub is_soft: bool,
     /// Whether it never moves.
     pub is_fixed: bool,
-    /// Where vertices are, of a rigid body in its own frame \[m\].
-    #[serde(skip)]
+    /// The frame that it is in first.
+    pub first: usize,
+    /// The frame that it is no longer in; none while it is there.
+    pub end: Option<usize>,
+    /// Where vertices are, of a rigid body in its collider's frame \[m\].
     pub vertices: Vec<[f32; 3]>,
     /// Wound outward.
-    #[serde(skip)]
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// One picture.
+impl ReplayMesh {
+    /// Whether it is in a frame.
+    pub fn is_in(&self, frame: usize) -> bool {
+        self.first <= frame && self.end.is_none_or(|end| frame < end)
+    }
+}
+
+/// One frame. Meshes that come later are not in its lists; those that were removed stay as they were last.
 #[derive(Clone, Debug, Default)]
 pub struct ReplayFrame {
     /// Time \[s\].
@@ -51,96 +49,94 @@ pub struct ReplayFrame {
     pub contacts: Vec<[f32; 6]>,
 }
 
-/// All pictures of a run.
-#[derive(Clone, Debug)]
+/// The axis that is upright on the screen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UpAxis {
+    /// As in scene files.
+    #[default]
+    Y,
+    /// As in files of robots.
+    Z,
+}
+
+/// All frames of a run.
+#[derive(Clone, Debug, Default)]
 pub struct Replay {
-    /// Pictures per second.
+    /// Frames per second; with [`Replay::record`] no more are taken.
     pub rate: f64,
+    /// Which way is up.
+    pub up: UpAxis,
     /// What is drawn.
     pub meshes: Vec<ReplayMesh>,
     /// In time.
     pub frames: Vec<ReplayFrame>,
-    bodies: Vec<Drawn>,
+    drawn: Vec<Drawn>,
+    deformables: HashSet<DeformableBodyHandle>,
+    colliders: HashSet<ColliderHandle>,
 }
 
 #[derive(Clone, Debug)]
 enum Drawn {
-    Rigid(RigidBodyHandle),
+    Rigid(ColliderHandle),
     Soft(DeformableBodyHandle, Surface),
 }
 
-/// How the vertices of a soft mesh move.
-#[derive(Clone, Debug)]
-enum Surface {
-    /// They are these of the body.
-    Own(Vec<u32>),
-    /// They are led by it.
-    Skin(Box<DeformableSkin>),
-    /// They stay: no skin could be made.
-    Still,
-}
-
 impl Replay {
-    /// Of a scene before its first step, which is the first picture.
-    pub fn new(scene: &Scene, stage: &Stage, rate: f64) -> Self {
-        let mut replay = Self { rate, meshes: Vec::new(), frames: Vec::new(), bodies: Vec::new() };
-        for (name, handle) in &stage.deformable {
-            replay.add_soft(name, *handle, stage);
-        }
-        let reach = replay.reach(stage);
-        for ((name, body, collider), own) in stage.rigid.iter().zip(&scene.rigid) {
-            let Some((vertices, triangles)) = surface(stage.physics.colliders[*collider].shape(), reach)
-            else {
-                continue;
-            };
-            let vertices = vertices.into_iter().map(|v| v.to_array()).collect();
-            let is_fixed = own.kind == crate::scene::Kind::Fixed;
-            replay.meshes.push(ReplayMesh {
-                name: name.clone(),
-                is_soft: false,
-                is_fixed,
-                vertices,
-                triangles,
-            });
-            replay.bodies.push(Drawn::Rigid(*body));
-        }
-        replay.take(0.0, stage);
-        replay
+    /// Without anything to draw; frames per second are told.
+    pub fn new(rate: f64) -> Self {
+        Self { rate, ..Self::default() }
     }
 
-    fn add_soft(&mut self, name: &str, handle: DeformableBodyHandle, stage: &Stage) {
-        let body = &stage.world.bodies[handle];
-        let model = body.model();
-        let is_solid = model.sheet_triangles().next().is_none() && model.rod_segments().next().is_none();
-        let (vertices, triangles, surface) = if is_solid {
-            let (own, triangles) = compact(model.surface_triangles());
-            let positions: Vec<[f32; 3]> = body.positions().map(|p| p.to_array()).collect();
-            (own.iter().map(|v| positions[*v as usize]).collect(), triangles, Surface::Own(own))
-        } else {
-            let mesh = DeformableSurfaceMesh::new(model);
-            let skin = DeformableSkin::bind(model, &mesh.vertices, &mesh.normals);
-            let surface = skin.map_or(Surface::Still, |skin| Surface::Skin(Box::new(skin)));
-            (mesh.vertices.iter().map(|v| v.to_array()).collect(), mesh.triangles, surface)
-        };
-        self.meshes.push(ReplayMesh {
-            name: name.into(),
-            is_soft: true,
-            is_fixed: false,
-            vertices,
-            triangles,
-        });
-        self.bodies.push(Drawn::Soft(handle, surface));
+    /// Whether a deformable body is drawn.
+    pub fn has_deformable(&self, handle: DeformableBodyHandle) -> bool {
+        self.deformables.contains(&handle)
+    }
+
+    /// Whether a collider is drawn, or was found to have nothing to draw.
+    pub fn has_collider(&self, handle: ColliderHandle) -> bool {
+        self.colliders.contains(&handle)
+    }
+
+    /// Draws a deformable body from the next frame on.
+    pub fn add_deformable(&mut self, name: &str, handle: DeformableBodyHandle, body: &DeformableBody) {
+        let ((vertices, triangles), surface) = shapes::of_deformable(body);
+        self.deformables.insert(handle);
+        self.add(name, (true, false), (vertices, triangles), Drawn::Soft(handle, surface));
+    }
+
+    /// Draws colliders from the next frame on, each with a name and whether it is fixed. Those of shapes that are no surface are left
+    /// out, and those that the set does not have.
+    pub fn add_colliders<'a>(
+        &mut self,
+        colliders: &ColliderSet,
+        added: impl IntoIterator<Item = (&'a str, ColliderHandle, bool)>,
+    ) {
+        let reach = self.reach(colliders);
+        for (name, handle, is_fixed) in added {
+            self.colliders.insert(handle);
+            let Some(collider) = colliders.get(handle) else { continue };
+            if let Some(mesh) = shapes::of_shape(collider.shape(), reach) {
+                self.add(name, (false, is_fixed), mesh, Drawn::Rigid(handle));
+            }
+        }
+    }
+
+    fn add(&mut self, name: &str, kind: (bool, bool), mesh: shapes::Triangles, drawn: Drawn) {
+        let ((is_soft, is_fixed), (vertices, triangles)) = (kind, mesh);
+        let (name, first) = (name.into(), self.frames.len());
+        self.meshes.push(ReplayMesh { name, is_soft, is_fixed, first, end: None, vertices, triangles });
+        self.drawn.push(drawn);
     }
 
     /// Half the size of all that is not without end.
-    fn reach(&self, stage: &Stage) -> f32 {
+    fn reach(&self, colliders: &ColliderSet) -> f32 {
         let mut whole = Aabb::new_invalid();
-        for vertex in self.meshes.iter().flat_map(|mesh| &mesh.vertices) {
+        for vertex in self.meshes.iter().filter(|mesh| mesh.is_soft).flat_map(|mesh| &mesh.vertices) {
             whole.take_point(Vector::from(*vertex));
         }
-        for (_, _, collider) in &stage.rigid {
-            let aabb = stage.physics.colliders[*collider].compute_aabb();
-            if aabb.half_extents().max_element() < 1.0e4 {
+        for (_, collider) in colliders.iter() {
+            let aabb = collider.compute_aabb();
+            if aabb.half_extents().max_element() < ENDLESS {
                 whole.merge(&aabb);
             }
         }
@@ -148,27 +144,46 @@ impl Replay {
         if reach.is_finite() && reach > 0.0 { reach } else { 1.0 }
     }
 
-    /// Takes a picture if it is time for one.
-    pub fn record(&mut self, time: f64, stage: &Stage) {
+    /// Takes a frame if it is time for one.
+    pub fn record(
+        &mut self,
+        time: f64,
+        bodies: &RigidBodySet,
+        colliders: &ColliderSet,
+        world: &DeformableWorld,
+    ) {
         if time * self.rate >= self.frames.len() as f64 - 1e-6 {
-            self.take(time, stage);
+            self.take(time, bodies, colliders, world);
         }
     }
 
-    fn take(&mut self, time: f64, stage: &Stage) {
+    /// Takes a frame.
+    pub fn take(
+        &mut self,
+        time: f64,
+        bodies: &RigidBodySet,
+        colliders: &ColliderSet,
+        world: &DeformableWorld,
+    ) {
         let mut frame = ReplayFrame { time, ..ReplayFrame::default() };
-        for (drawn, mesh) in self.bodies.iter().zip(&self.meshes) {
-            match drawn {
-                Drawn::Rigid(body) => {
-                    let pose = stage.physics.bodies[*body].position();
-                    let ([x, y, z], [i, j, k, w]) = (pose.translation.to_array(), pose.rotation.to_array());
-                    frame.poses.push([x, y, z, i, j, k, w]);
-                }
-                Drawn::Soft(handle, surface) => frame.add_soft(&stage.world.bodies[*handle], surface, mesh),
+        let (number, before) = (self.frames.len(), self.frames.last());
+        for (drawn, mesh) in self.drawn.iter().zip(&mut self.meshes) {
+            let is_there = match drawn {
+                Drawn::Rigid(handle) => match collider_pose(*handle, bodies, colliders) {
+                    Some(pose) => frame.add_pose(&pose),
+                    None => frame.keep_pose(before),
+                },
+                Drawn::Soft(handle, surface) => match world.bodies.get(*handle) {
+                    Some(body) => frame.add_soft(body, surface, mesh),
+                    None => frame.keep_soft(before, mesh.vertices.len()),
+                },
+            };
+            if !is_there {
+                mesh.end.get_or_insert(number);
             }
         }
-        let own = stage.world.contacts().iter().map(|c| (c.point, c.force));
-        let pairs = stage.world.pair_contacts().iter().map(|c| (c.point, c.force));
+        let own = world.contacts().iter().map(|c| (c.point, c.force));
+        let pairs = world.pair_contacts().iter().map(|c| (c.point, c.force));
         for (point, force) in own.chain(pairs).filter(|(_, force)| force.length() > 0.0) {
             let ([x, y, z], [i, j, k]) = (point.to_array(), force.to_array());
             frame.contacts.push([x, y, z, i, j, k]);
@@ -177,14 +192,44 @@ impl Replay {
     }
 }
 
+/// Where a collider is: on its body, which may have been moved since the last step.
+fn collider_pose(handle: ColliderHandle, bodies: &RigidBodySet, colliders: &ColliderSet) -> Option<Pose> {
+    let collider = colliders.get(handle)?;
+    let on_parent = collider.parent().and_then(|body| bodies.get(body)).zip(collider.position_wrt_parent());
+    Some(on_parent.map_or(*collider.position(), |(body, pose)| *body.position() * *pose))
+}
+
+/// Each tells whether the mesh is still there.
 impl ReplayFrame {
-    fn add_soft(&mut self, body: &DeformableBody, surface: &Surface, mesh: &ReplayMesh) {
+    fn add_pose(&mut self, pose: &Pose) -> bool {
+        let ([x, y, z], [i, j, k, w]) = (pose.translation.to_array(), pose.rotation.to_array());
+        self.poses.push([x, y, z, i, j, k, w]);
+        true
+    }
+
+    fn keep_pose(&mut self, before: Option<&Self>) -> bool {
+        let last = before.and_then(|frame| frame.poses.get(self.poses.len()));
+        self.poses.push(last.copied().unwrap_or([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
+        false
+    }
+
+    fn keep_soft(&mut self, before: Option<&Self>, count: usize) -> bool {
+        let range = self.vertices.len()..self.vertices.len() + count;
+        match before.filter(|frame| frame.vertices.len() >= range.end) {
+            Some(frame) => self.vertices.extend(&frame.vertices[range.clone()]),
+            None => self.vertices.resize(range.end, [0.0; 3]),
+        }
+        self.stresses.resize(range.end, 0.0);
+        false
+    }
+
+    fn add_soft(&mut self, body: &DeformableBody, surface: &Surface, mesh: &ReplayMesh) -> bool {
         if let Surface::Own(own) = surface {
             let positions: Vec<Vector> = body.positions().collect();
             let stresses = body.vertex_stresses();
             self.vertices.extend(own.iter().map(|v| positions[*v as usize].to_array()));
             self.stresses.extend(own.iter().map(|v| stresses[*v as usize].von_mises() as f32));
-            return;
+            return true;
         }
         let mut positions: Vec<Vector> = mesh.vertices.iter().map(|v| Vector::from(*v)).collect();
         let mut normals = vec![Vector::ZERO; positions.len()];
@@ -194,49 +239,6 @@ impl ReplayFrame {
         }
         self.vertices.extend(positions.iter().map(|p| p.to_array()));
         self.stresses.resize(self.vertices.len(), 0.0);
+        true
     }
-}
-
-/// The vertices that triangles have, in order, and the triangles in their numbers.
-fn compact(triangles: impl Iterator<Item = [u32; 3]>) -> (Vec<u32>, Vec<[u32; 3]>) {
-    let triangles: Vec<[u32; 3]> = triangles.collect();
-    let mut of_surface: Vec<u32> = triangles.iter().flatten().copied().collect();
-    of_surface.sort_unstable();
-    of_surface.dedup();
-    let number = |v: u32| of_surface.binary_search(&v).unwrap_or(0) as u32;
-    let triangles = triangles.into_iter().map(|t| t.map(number)).collect();
-    (of_surface, triangles)
-}
-
-/// Triangles of a collider's shape.
-fn surface(shape: &dyn Shape, reach: f32) -> Option<(Vec<Vector>, Vec<[u32; 3]>)> {
-    let mesh = match shape.as_typed_shape() {
-        TypedShape::Ball(s) => s.to_trimesh(20, 20),
-        TypedShape::Cuboid(s) => s.to_trimesh(),
-        TypedShape::Capsule(s) => s.to_trimesh(20, 10),
-        TypedShape::Cylinder(s) => s.to_trimesh(24),
-        TypedShape::Cone(s) => s.to_trimesh(24),
-        TypedShape::TriMesh(s) => (s.vertices().to_vec(), s.indices().to_vec()),
-        TypedShape::HeightField(s) => s.to_trimesh(),
-        TypedShape::Compound(s) => {
-            let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
-            for (pose, part) in s.shapes() {
-                let (own, of_own) = surface(&**part, reach)?;
-                let first = vertices.len() as u32;
-                vertices.extend(own.iter().map(|v| pose.transform_point(*v)));
-                triangles.extend(of_own.iter().map(|t| t.map(|v| v + first)));
-            }
-            (vertices, triangles)
-        }
-        TypedShape::HalfSpace(s) => {
-            let (a, b) = s.normal.any_orthonormal_pair();
-            let corner = |x: f32, y: f32| (a * x + b * y) * reach * HALF_SPACE_REACH;
-            (
-                vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
-                vec![[0, 1, 2], [0, 2, 3]],
-            )
-        }
-        _ => return None,
-    };
-    Some(mesh)
 }
