@@ -70,7 +70,7 @@ class HtmlReplay:
     """A page with a player in 3D, whole in one file that needs no network: surfaces of the deformable bodies coloured by their stress, rigid
     colliders, and contact forces, over time. Written by ``close``, or at the end of ``with``.
 
-    A frame takes 14 bytes of a vertex of the surface before it is compressed, in memory 16 and up to 24 of a contact. Positions are kept
+    A frame takes 7 bytes of a vertex of the surface and 24 of a contact before it is compressed, in memory 16 and 24. Positions are kept
     in 65535 steps of the space that all deformable bodies go through. ``up`` is "y" or "z", that of gravity if it is not told; ``names`` is a
     table from handles of bodies and colliders. Colliders keep the shape that they are first seen with. Sensors, joints and cables are not drawn.
     """
