@@ -286,7 +286,7 @@ pub(super) fn rotation(quantity: &'static str, value: Rotation) -> Result<(), Bo
     }
 }
 
-/// A vector of the user's, widened if it is one.
+/// A number of the user's, if it is in its range.
 pub(super) fn in_range(
     quantity: &'static str,
     value: f64,
@@ -299,6 +299,7 @@ pub(super) fn in_range(
     }
 }
 
+/// A vector of the user's, widened if it is one.
 pub(super) fn finite(quantity: &'static str, value: Vector) -> Result<Vec3, BodyError> {
     match value.is_finite() {
         true => Ok(from_real(value)),
