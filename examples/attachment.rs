@@ -36,7 +36,7 @@ fn main() -> Result<(), DeformableBodyError> {
     let to_box = AttachTo::RigidBody(load, *physics.bodies[load].position());
     let cable = deformables.bodies.attach(block, &top, to_box)?;
     if let Some(cable) = deformables.bodies.attachment_mut(cable) {
-        cable.set_length(0.3);
+        cable.set_length(0.3)?;
     }
 
     let force = |world: &DeformableWorld, of| world.bodies.attachment(of).map_or(0.0, |a| a.force().y);

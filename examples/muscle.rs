@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let own = 0.5 * deformables.bodies[muscle].mass() * 9.81;
     println!("weight {weight:.2} N");
     for activation in [1.0, 0.8, 0.6] {
-        deformables.bodies[muscle].set_activation(activation);
+        deformables.bodies[muscle].set_activation(activation)?;
         for _ in 0..240 {
             deformables.step(&mut physics);
         }

@@ -99,6 +99,16 @@ pub enum BodyError {
         /// Its value.
         value: Vector,
     },
+    /// A number that is NaN or outside of its range.
+    #[error("{quantity} is {value:?}, but must be {wanted}")]
+    OutOfRange {
+        /// What was to be set.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+        /// The range.
+        wanted: &'static str,
+    },
     /// A quaternion that is NaN, infinite or not of unit length.
     #[error("{quantity} is no rotation: the quaternion {value:?} is not of unit length")]
     NoRotation {

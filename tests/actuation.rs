@@ -32,7 +32,7 @@ fn muscles_shorten_a_bar_to_where_its_matrix_holds_them() {
                 .tune(|settings| settings.solver = solver)
                 .can_sleep(false);
             let bar = world.insert(bar).unwrap();
-            world.bodies[bar].set_activation(activation);
+            world.bodies[bar].set_activation(activation).unwrap();
             for _ in 0..200 {
                 world.step(&mut physics);
             }
@@ -57,7 +57,7 @@ fn muscles_on_one_side_bend_the_bar() {
         .material(DeformableMaterial::new(1e5, 0.4).fibre_modulus(1e5).mass_damping(5.0))
         .pinned(|x| x.x < -0.2499);
     let bar = world.insert(bar).unwrap();
-    world.bodies[bar].set_activation(0.8);
+    world.bodies[bar].set_activation(0.8).unwrap();
     for _ in 0..200 {
         world.step(&mut physics);
     }

@@ -80,6 +80,8 @@ fn what_is_gone_is_told_and_what_cannot_be_is_refused() {
         (signals.insert("n", activation, [0.5, 1.0], 0.0, 1.0), "rate"),
         (signals.insert("n", activation, [0.5, 1.0], f64::NAN, 1.0), "rate"),
         (signals.insert("n", activation, [0.5, 1.0], 1.0, 2.0), "start"),
+        (signals.insert("n", activation, [-0.1, 1.0], 1.0, 1.0), "within 0 and 10, is -0.1"),
+        (signals.insert("n", activation, [0.5, 10.5], 1.0, 1.0), "within 0 and 10, is 10.5"),
         (signals.command("other", 1.0), "no signal \"other\""),
         (signals.command("m", f64::NAN), "command"),
     ];

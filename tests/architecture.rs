@@ -173,6 +173,7 @@ fn files_and_functions_are_short() {
         "examples",
         "cli/src",
         "cli/tests",
+        "replay/src",
         "robots/src",
         "robots/tests",
         "robots/examples",

@@ -59,7 +59,7 @@ fn a_box_hangs_on_a_strap_and_a_compliant_one_gives_way() {
         let pose = *physics.bodies[load].position();
         let ends = right(&world.bodies[strap]);
         let attachment = world.bodies.attach(strap, &ends, AttachTo::RigidBody(load, pose)).unwrap();
-        world.bodies.attachment_mut(attachment).unwrap().set_compliance(compliance);
+        world.bodies.attachment_mut(attachment).unwrap().set_compliance(compliance).unwrap();
         for _ in 0..900 {
             world.step(&mut physics);
         }
@@ -94,7 +94,7 @@ fn an_overloaded_attachment_breaks() {
     let ends = left(&world.bodies[body]);
     let attachment = world.bodies.attach(body, &ends, AttachTo::World).unwrap();
     let weight = world.bodies[body].mass() * G;
-    world.bodies.attachment_mut(attachment).unwrap().set_break_force(0.5 * weight);
+    world.bodies.attachment_mut(attachment).unwrap().set_break_force(0.5 * weight).unwrap();
     (0..60).for_each(|_| world.step(&mut physics));
     assert!(world.bodies.attachment(attachment).unwrap().is_broken());
     assert!(world.bodies[body].center_of_mass()[1] < -1.0);
@@ -148,7 +148,7 @@ fn cable_without_compliance_does_not_stretch_under_a_thousand_times_the_weight_a
     let top = at_rest_where(&world.bodies[block], |p| p[1] > 0.0999 && p[0] == 0.0 && p[2] == 0.0);
     let cable = world.bodies.attach(block, &top, AttachTo::World).unwrap();
     let anchor = [0.0, 0.1, 0.0];
-    world.bodies.attachment_mut(cable).unwrap().set_length(0.5);
+    world.bodies.attachment_mut(cable).unwrap().set_length(0.5).unwrap();
     let distance = |world: &DeformableWorld| {
         let p = world.bodies[block].position(top[0]).unwrap();
         (0..3).map(|k| (p[k] - anchor[k]).powi(2)).sum::<f64>().sqrt()
@@ -217,12 +217,35 @@ fn attachment_of_infinite_compliance_holds_nothing_and_disturbs_nothing() {
     let body = world.insert(slab().translation(Vector::Y * 0.3)).unwrap();
     let ends = left(&world.bodies[body]);
     let attachment = world.bodies.attach(body, &ends, AttachTo::World).unwrap();
-    world.bodies.attachment_mut(attachment).unwrap().set_compliance(f64::INFINITY);
+    world.bodies.attachment_mut(attachment).unwrap().set_compliance(f64::INFINITY).unwrap();
     for _ in 0..240 {
         world.step(&mut physics);
     }
     let force: f64 = world.contacts_with(floor).map(|c| f64::from(c.force.y)).sum();
     assert!((force / (world.bodies[body].mass() * G) - 1.0).abs() < 1e-3, "{force}");
+}
+
+#[test]
+fn numbers_of_attachments_out_of_range_are_refused_by_name_and_value() {
+    let mut world = DeformableWorld::new();
+    let body = world.insert(slab()).unwrap();
+    let ends = left(&world.bodies[body]);
+    let handle = world.bodies.attach(body, &ends, AttachTo::World).unwrap();
+    assert_eq!(DeformableAttachmentHandle::from_raw_parts(handle.into_raw_parts()), handle);
+    let attachment = world.bodies.attachment_mut(handle).unwrap();
+    attachment.set_compliance(1e-3).unwrap();
+    attachment.set_length(0.1).unwrap();
+    attachment.set_break_force(5.0).unwrap();
+    for bad in [f64::NAN, -1.0, f64::NEG_INFINITY] {
+        let told = |name: &str| format!("{name} is {bad:?}, but must be zero or positive");
+        assert_eq!(attachment.set_compliance(bad).unwrap_err().to_string(), told("compliance"));
+        assert_eq!(attachment.set_length(bad).unwrap_err().to_string(), told("length"));
+        assert_eq!(attachment.set_break_force(bad).unwrap_err().to_string(), told("break_force"));
+    }
+    assert_eq!((attachment.compliance(), attachment.length(), attachment.break_force()), (1e-3, 0.1, 5.0));
+    // Infinity is a number that each has a meaning for: it lets go, and never breaks.
+    attachment.set_break_force(f64::INFINITY).unwrap();
+    attachment.set_length(f64::INFINITY).unwrap();
 }
 
 #[test]
@@ -241,7 +264,7 @@ fn breaking_wakes_what_sleeps_on_it_and_so_does_removing_what_it_is_attached_to(
         }
         assert!(world.bodies[body].is_sleeping());
         if breaks {
-            world.bodies.attachment_mut(attachment).unwrap().set_break_force(1.0);
+            world.bodies.attachment_mut(attachment).unwrap().set_break_force(1.0).unwrap();
         } else {
             physics.remove_body(anchor);
         }

@@ -241,6 +241,7 @@ fn slack_cables_do_nothing_and_catch() {
     let tied = top(&deformables.bodies[soft]);
     let points = [CablePoint::Vertex(soft, tied), CablePoint::World(Vector::new(0.0, 1.05, 0.0))];
     let cable = deformables.bodies.insert_cable(DeformableCableBuilder::new(points).length(2.0)).unwrap();
+    assert_eq!(DeformableCableHandle::from_raw_parts(cable.into_raw_parts()), cable);
     steps(&mut physics, &mut deformables, 10);
     assert_eq!(deformables.bodies.cable(cable).unwrap().tension(), 0.0);
     steps(&mut physics, &mut deformables, 300);

@@ -74,7 +74,7 @@ fn hangings() -> (PhysicsWorld, DeformableWorld) {
     let rope =
         world.insert(DeformableBodyBuilder::rope(&points, 0.01).material(silk.density(900.0))).unwrap();
     let hook = world.bodies.attach(rope, &[0], AttachTo::World).unwrap();
-    world.bodies.attachment_mut(hook).unwrap().set_length(0.1);
+    world.bodies.attachment_mut(hook).unwrap().set_length(0.1).unwrap();
     let load = rigid(&mut physics, Vector::new(1.8, 0.9, 0.0), ColliderBuilder::cuboid(0.05, 0.05, 0.05));
     let pose = *physics.bodies[load].position();
     world.bodies.attach(rope, &[8], AttachTo::RigidBody(load, pose)).unwrap();
@@ -90,7 +90,7 @@ fn hangings() -> (PhysicsWorld, DeformableWorld) {
     let tip = world.bodies[bar].vertices_where(|x| x.x > -0.81);
     let pose = *physics.bodies[arm].position();
     let tip = world.bodies.attach(bar, &tip, AttachTo::RigidBody(arm, pose)).unwrap();
-    world.bodies.attachment_mut(tip).unwrap().set_compliance(1e-3);
+    world.bodies.attachment_mut(tip).unwrap().set_compliance(1e-3).unwrap();
     (physics, world)
 }
 

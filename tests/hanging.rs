@@ -106,7 +106,7 @@ fn glue_without_a_gap_carries_what_hangs_on_it_too() {
     for compliance in [0.0, 1e-13, 1e-10, 1e-9, 1e-8, 1.1e-8, 1e-6, 1e-3] {
         let ball = SphericalJointBuilder::new().local_anchor2(Vector::Y * 0.2);
         let mut hanging = Hanging::glued_across(0.0, ball, 0.0);
-        hanging.world.bodies.attachment_mut(hanging.glue).unwrap().set_compliance(compliance);
+        hanging.world.bodies.attachment_mut(hanging.glue).unwrap().set_compliance(compliance).unwrap();
         let plate = hanging.physics.bodies[hanging.plate].colliders()[0];
         for _ in 0..3 {
             let (_, _, glue) = hanging.rest(420);
@@ -131,7 +131,7 @@ fn a_face_on_springs_does_not_sink_into_what_it_is_attached_to() {
     let lower = at_rest_where(&world.bodies[body], |x| x[1] < -0.199);
     let pose = *physics.bodies[ground].position();
     let springs = world.bodies.attach(body, &lower, AttachTo::RigidBody(ground, pose)).unwrap();
-    world.bodies.attachment_mut(springs).unwrap().set_compliance(1e-3);
+    world.bodies.attachment_mut(springs).unwrap().set_compliance(1e-3).unwrap();
     (0..240).for_each(|_| world.step(&mut physics));
     let lowest = lower.iter().map(|&v| world.bodies[body].position(v).unwrap()[1]).fold(0.0, f64::min);
     let carried = f64::from(world.contact_force(body, floor).y);

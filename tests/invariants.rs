@@ -218,6 +218,61 @@ fn bad_requests_are_named_and_change_nothing() {
 }
 
 #[test]
+fn numbers_out_of_range_are_refused_by_name_and_value() {
+    let mut world = DeformableWorld::new();
+    let body = world.insert(cube(DeformableMaterial::new(1e6, 0.3), 0.2)).unwrap();
+    let body = &mut world.bodies[body];
+    body.set_activation(0.7).unwrap();
+    body.set_gravity_scale(-2.0).unwrap();
+    for (value, text) in [
+        (f64::NAN, "activation is NaN, but must be from 0 to 10"),
+        (f64::INFINITY, "activation is inf, but must be from 0 to 10"),
+        (-1e-9, "activation is -1e-9, but must be from 0 to 10"),
+        (10.1, "activation is 10.1, but must be from 0 to 10"),
+    ] {
+        assert_eq!(body.set_activation(value).unwrap_err().to_string(), text);
+    }
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let text = body.set_gravity_scale(value).unwrap_err().to_string();
+        assert_eq!(text, format!("gravity_scale is {value:?}, but must be finite"));
+    }
+    assert_eq!((body.activation(), body.gravity_scale()), (0.7, -2.0));
+    let bad = DeformableBodyBuilder::cuboid(Vector::splat(0.1), [1, 1, 1]).gravity_scale(f64::NAN);
+    assert_eq!(bad.build().unwrap_err().to_string(), "gravity_scale is NaN, but must be finite");
+}
+
+#[test]
+fn positions_and_velocities_of_all_vertices_are_set_at_once_or_not_at_all() {
+    let mut world = DeformableWorld::new();
+    let body = world.insert(cube(DeformableMaterial::new(1e6, 0.3), 0.2)).unwrap();
+    let body = &mut world.bodies[body];
+    let read = |body: &DeformableBody| -> [Vec<[f64; 3]>; 2] {
+        let all = 0..body.vertex_count();
+        [
+            all.clone().map(|v| body.position(v).unwrap()).collect(),
+            all.map(|v| body.velocity(v).unwrap()).collect(),
+        ]
+    };
+    let [mut x, mut v] = read(body);
+    // Numbers that single precision does not hold.
+    x.iter_mut().zip(&mut v).enumerate().for_each(|(k, (x, v))| {
+        x[1] += 1e-9 * k as f64;
+        v[0] = 1.0 / (k + 3) as f64;
+    });
+    body.set_positions(&x).unwrap();
+    body.set_velocities(&v).unwrap();
+    assert_eq!(read(body), [x.clone(), v.clone()]);
+    let wrong = BodyError::WrongSize { vertices: x.len() - 1, expected: x.len() };
+    assert_eq!(body.set_positions(&x[1..]), Err(wrong));
+    assert_eq!(body.set_velocities(&v[1..]), Err(wrong));
+    let mut bad = vec![[7.0; 3]; x.len()];
+    *bad.last_mut().unwrap() = [0.0, f64::NAN, 0.0];
+    assert!(body.set_positions(&bad).unwrap_err().to_string().starts_with("position is not finite"));
+    assert!(body.set_velocities(&bad).unwrap_err().to_string().starts_with("velocity is not finite"));
+    assert_eq!(read(body), [x, v]);
+}
+
+#[test]
 fn runtime_changes_take_effect() {
     let (mut physics, floor) = world_with_floor(1.0 / 60.0);
     let mut world = DeformableWorld::new();
@@ -228,10 +283,10 @@ fn runtime_changes_take_effect() {
     let weight = 64.0 * G;
     let force = |world: &DeformableWorld| f64::from(world.contact_force(body, floor).y) / weight;
     assert!((force(&world) - 1.0).abs() < 1e-6);
-    world.bodies[body].set_gravity_scale(0.5);
+    world.bodies[body].set_gravity_scale(0.5).unwrap();
     settle(&mut world, &mut physics);
     assert!((force(&world) - 0.5).abs() < 1e-6);
-    world.bodies[body].set_gravity_scale(1.0);
+    world.bodies[body].set_gravity_scale(1.0).unwrap();
     world.bodies[body]
         .set_material(DeformableMaterial::new(1e5, 0.3).density(2000.0).mass_damping(3.0))
         .unwrap();

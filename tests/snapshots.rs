@@ -165,7 +165,7 @@ fn menagerie() -> (PhysicsWorld, DeformableWorld) {
         bodies.into_iter().enumerate().map(|(k, b)| world.insert(b.translation(at(k))).unwrap()).collect();
     let material = DeformableMaterial::new(1e5, 0.3).fibre_modulus(1e5);
     world.bodies[handles[4]].set_material(material).unwrap();
-    world.bodies[handles[4]].set_activation(0.9);
+    world.bodies[handles[4]].set_activation(0.9).unwrap();
     world.bodies[handles[1]].set_wind(Some(DeformableWind::new(Vector::Z * 3.0))).unwrap();
     world.bodies[handles[0]].add_force(&[0, 1], Vector::X).unwrap();
     world.bodies.attach(handles[2], &[3], AttachTo::World).unwrap();

@@ -106,7 +106,7 @@ fn control(
         body.set_vels(velocity.linear, velocity.angular)?;
     }
     if let Some(gravity) = gravity.filter(|gravity| is_new || gravity.is_changed()) {
-        body.set_gravity_scale(f64::from(gravity.0));
+        body.set_gravity_scale(f64::from(gravity.0))?;
     }
     if let Some(force) = force.filter(|force| is_new || force.is_changed()) {
         body.reset_forces();

@@ -197,7 +197,7 @@ fn attach_one(
     let vertices: Vec<usize> = vertices.into_iter().filter(|v| !is_inside[*v]).collect();
     let attachment = bodies.attach(handle.0, &vertices, partner)?;
     if let Some(attachment) = bodies.attachment_mut(attachment) {
-        attachment.set_compliance(anchor.compliance);
+        attachment.set_compliance(anchor.compliance)?;
     }
     Ok(())
 }

@@ -293,3 +293,51 @@ pub fn heights(object: &Bound<'_, PyAny>) -> PyResult<rapier3d::parry::utils::Ar
     }
     Ok(rapier3d::parry::utils::Array2::new(rows, columns, real))
 }
+
+/// The user's array to be filled, checked, or a new one.
+fn filled<'py, D: numpy::ndarray::Dimension>(
+    out: &Bound<'py, PyAny>,
+    shape: &[usize],
+) -> PyResult<Bound<'py, numpy::PyArray<f64, D>>> {
+    let untyped = out.cast::<PyUntypedArray>().map_err(|_| {
+        PyTypeError::new_err(format!("out: expected an array of float64, got {}", out.get_type()))
+    })?;
+    let Ok(array) = out.cast::<numpy::PyArray<f64, D>>() else {
+        return Err(match untyped.ndim() == shape.len() {
+            true => {
+                let dtype = untyped.getattr("dtype")?;
+                PyTypeError::new_err(format!("out: expected an array of float64, got one of {dtype}"))
+            }
+            false => wrong_shape(untyped, shape),
+        });
+    };
+    if untyped.shape() != shape {
+        return Err(wrong_shape(untyped, shape));
+    }
+    if !untyped.is_c_contiguous() {
+        return Err(bad_value("out: the array is not C-contiguous".into()));
+    }
+    if !out.getattr("flags")?.getattr("writeable")?.is_truthy()? {
+        return Err(bad_value("out: the array is read-only".into()));
+    }
+    Ok(array.clone())
+}
+
+fn wrong_shape(array: &Bound<'_, PyUntypedArray>, wanted: &[usize]) -> PyErr {
+    let told = |shape: &[usize]| format!("{shape:?}").replace('[', "(").replace(']', ")");
+    bad_value(format!("out: expected the shape {}, got {}", told(wanted), told(array.shape())))
+}
+
+/// An array of shape (n,) to be filled.
+pub fn filled1<'py>(py: Python<'py>, out: Option<&Bound<'py, PyAny>>, count: usize) -> PyResult<Array1<'py>> {
+    out.map_or_else(|| Ok(PyArray1::zeros(py, count, false)), |out| filled(out, &[count]))
+}
+
+/// An array of shape (n, k) to be filled.
+pub fn filled2<'py>(
+    py: Python<'py>,
+    out: Option<&Bound<'py, PyAny>>,
+    shape: [usize; 2],
+) -> PyResult<Array2<'py>> {
+    out.map_or_else(|| Ok(PyArray2::zeros(py, shape, false)), |out| filled(out, &shape))
+}

@@ -4,7 +4,7 @@ use crate::arrays::{Array1, Triple, vector, vertices};
 use crate::errors::{Failure, bad_value, exceptions::InvalidHandle, no_such, raised};
 use crate::handles::{PyAttachmentHandle, PyDeformableHandle, PyRigidBodyHandle};
 use crate::world::World;
-use foible3d::{AttachTo, DeformableAttachment, HandleError};
+use foible3d::{AttachTo, BodyError, DeformableAttachment, HandleError};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
@@ -30,13 +30,19 @@ impl Attachment {
             .with(py, |inner| inner.deformables.bodies.attachment_mut(self.handle.0).map(work))?;
         found.ok_or_else(|| gone(self.handle))
     }
+
+    /// Does what may be refused.
+    fn try_with(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut DeformableAttachment) -> Result<(), BodyError>,
+    ) -> PyResult<()> {
+        self.with(py, |attachment| work(attachment).map_err(Failure::from))?.map_err(PyErr::from)
+    }
 }
 
 fn gone(handle: PyAttachmentHandle) -> PyErr {
-    match handle.id() {
-        Ok(id) => InvalidHandle::new_err(format!("no attachment of number {id}")),
-        Err(error) => error,
-    }
+    InvalidHandle::new_err(format!("no attachment of number {}", handle.id()))
 }
 
 /// A number that may be infinite, but not NaN and not negative.
@@ -75,8 +81,7 @@ impl Attachment {
 
     #[setter]
     fn set_compliance(&self, py: Python<'_>, compliance: f64) -> PyResult<()> {
-        let compliance = scale("compliance", compliance)?;
-        self.with(py, |attachment| attachment.set_compliance(compliance))
+        self.try_with(py, |attachment| attachment.set_compliance(compliance))
     }
 
     /// How far the vertices may go from their places [m]: cables of this length; zero keeps them there. May be set.
@@ -87,8 +92,7 @@ impl Attachment {
 
     #[setter]
     fn set_length(&self, py: Python<'_>, length: f64) -> PyResult<()> {
-        let length = scale("length", length)?;
-        self.with(py, |attachment| attachment.set_length(length))
+        self.try_with(py, |attachment| attachment.set_length(length))
     }
 
     /// Total force at which the attachment breaks [N]; infinite if it does not. May be set.
@@ -99,8 +103,7 @@ impl Attachment {
 
     #[setter]
     fn set_break_force(&self, py: Python<'_>, force: f64) -> PyResult<()> {
-        let force = scale("break_force", force)?;
-        self.with(py, |attachment| attachment.set_break_force(force))
+        self.try_with(py, |attachment| attachment.set_break_force(force))
     }
 
     /// Whether it has broken; it does nothing then, until it is mended.
@@ -120,8 +123,8 @@ impl Attachment {
         self.with(py, |attachment| attachment.translate(by))
     }
 
-    fn __repr__(&self) -> PyResult<String> {
-        Ok(format!("<Attachment {}>", self.handle.id()?))
+    fn __repr__(&self) -> String {
+        format!("<Attachment {}>", self.handle.id())
     }
 }
 
@@ -190,9 +193,9 @@ impl World {
             let bodies = &mut inner.deformables.bodies;
             let handle = bodies.attach(body.0, &own, to)?;
             if let Some(attachment) = bodies.attachment_mut(handle) {
-                attachment.set_compliance(numbers[0]);
-                attachment.set_length(numbers[1]);
-                attachment.set_break_force(numbers[2]);
+                attachment.set_compliance(numbers[0])?;
+                attachment.set_length(numbers[1])?;
+                attachment.set_break_force(numbers[2])?;
             }
             Ok::<_, Failure>(handle)
         })?;

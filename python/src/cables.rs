@@ -89,10 +89,7 @@ impl Cable {
 }
 
 fn gone(handle: PyCableHandle) -> PyErr {
-    match handle.id() {
-        Ok(id) => InvalidHandle::new_err(format!("no cable of number {id}")),
-        Err(error) => error,
-    }
+    InvalidHandle::new_err(format!("no cable of number {}", handle.id()))
 }
 
 #[pymethods]
@@ -204,12 +201,12 @@ impl Cable {
         self.read(py, |cable, _| cable.point_count())
     }
 
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let id = self.handle.id()?;
-        Ok(match self.read(py, |cable, _| cable.point_count()) {
+    fn __repr__(&self, py: Python<'_>) -> String {
+        let id = self.handle.id();
+        match self.read(py, |cable, _| cable.point_count()) {
             Ok(count) => format!("<Cable {id}: {count} points>"),
             Err(_) => format!("<Cable {id}: removed>"),
-        })
+        }
     }
 }
 

@@ -11,7 +11,8 @@ use pyo3::prelude::*;
 /// A deformable body of a world.
 ///
 /// ``world.deformable_bodies[handle]`` gives it; it reads and writes the world. Raises `InvalidHandle` once the body was removed. Arrays are
-/// copies: writing into them changes nothing.
+/// copies: writing into them changes nothing. There are no views of the world's own numbers: those stand in the order of the solver, move
+/// when bodies come and go, and change under a view while another thread steps. ``read_positions`` and the like fill an array of yours.
 #[pyclass(frozen, name = "DeformableBody", module = "foible3d")]
 pub struct PyDeformableBody {
     /// Where it is.
@@ -87,11 +88,7 @@ impl PyDeformableBody {
     #[setter]
     fn set_positions(&self, py: Python<'_>, positions: &Bound<'_, PyAny>) -> PyResult<()> {
         let positions = points(positions, "positions")?;
-        self.try_with(py, |body| {
-            check_count(body, positions.len())?;
-            check_finite("position", &positions)?;
-            (0..).zip(positions).try_for_each(|(vertex, x)| body.set_position(vertex, x))
-        })
+        self.try_with(py, |body| body.set_positions(&positions))
     }
 
     /// Velocities of the vertices [m/s], an array of shape (n, 3). May be set.
@@ -106,11 +103,7 @@ impl PyDeformableBody {
     #[setter]
     fn set_velocities(&self, py: Python<'_>, velocities: &Bound<'_, PyAny>) -> PyResult<()> {
         let velocities = points(velocities, "velocities")?;
-        self.try_with(py, |body| {
-            check_count(body, velocities.len())?;
-            check_finite("velocity", &velocities)?;
-            (0..).zip(velocities).try_for_each(|(vertex, v)| body.set_velocity(vertex, Triple(v).real()))
-        })
+        self.try_with(py, |body| body.set_velocities(&velocities))
     }
 
     /// Positions of the vertices in the rest shape [m], an array of shape (n, 3).
@@ -235,20 +228,5 @@ impl PyDeformableBody {
             Ok(text) => format!("<DeformableBody {index}.{generation}: {text}>"),
             Err(_) => format!("<DeformableBody {index}.{generation}: removed>"),
         }
-    }
-}
-
-fn check_count(body: &DeformableBody, vertices: usize) -> Result<(), BodyError> {
-    match body.vertex_count() {
-        expected if expected == vertices => Ok(()),
-        expected => Err(BodyError::WrongSize { vertices, expected }),
-    }
-}
-
-/// All of them before the first is set, so that nothing is changed if one is refused.
-fn check_finite(quantity: &'static str, values: &[[f64; 3]]) -> Result<(), BodyError> {
-    match values.iter().map(|value| Triple(*value).real()).find(|value| !value.is_finite()) {
-        Some(value) => Err(BodyError::NotFinite { quantity, value }),
-        None => Ok(()),
     }
 }

@@ -156,10 +156,7 @@ impl PyDeformableBody {
 
     #[setter]
     fn set_activation(&self, py: Python<'_>, stretch: f64) -> PyResult<()> {
-        if !(0.0..=10.0).contains(&stretch) {
-            return Err(bad_value(format!("activation is {stretch}, but must be in [0, 10]")));
-        }
-        self.with(py, |body| body.set_activation(stretch))
+        self.try_with(py, |body| body.set_activation(stretch))
     }
 
     /// Factor on gravity [–]. May be set.
@@ -170,8 +167,7 @@ impl PyDeformableBody {
 
     #[setter]
     fn set_gravity_scale(&self, py: Python<'_>, scale: f64) -> PyResult<()> {
-        crate::arrays::number("gravity_scale", scale, false)?;
-        self.with(py, |body| body.set_gravity_scale(scale))
+        self.try_with(py, |body| body.set_gravity_scale(scale))
     }
 
     /// What the body collides with. May be set.

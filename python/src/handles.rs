@@ -84,25 +84,22 @@ macro_rules! numbered {
         impl $name {
             /// The handle of this number.
             #[new]
-            fn new(id: u64) -> PyResult<Self> {
-                // The crate has no way to a handle from its number but serde's.
-                let bytes = postcard::to_stdvec(&id).map_err(internal)?;
-                postcard::from_bytes(&bytes).map(Self).map_err(internal)
+            fn new(id: u64) -> Self {
+                Self(<$of>::from_raw_parts(id))
             }
 
             /// Its number: how many of its kind were made before.
             #[getter]
-            pub fn id(&self) -> PyResult<u64> {
-                let bytes = postcard::to_stdvec(&self.0).map_err(internal)?;
-                postcard::from_bytes(&bytes).map_err(internal)
+            pub fn id(&self) -> u64 {
+                self.0.into_raw_parts()
             }
 
-            fn __repr__(&self) -> PyResult<String> {
-                Ok(format!(concat!($python, "(id={})"), self.id()?))
+            fn __repr__(&self) -> String {
+                format!(concat!($python, "(id={})"), self.id())
             }
 
-            fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (u64,))> {
-                Ok((slf.get_type().into_any(), (slf.get().id()?,)))
+            fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (u64,)) {
+                (slf.get_type().into_any(), (slf.get().id(),))
             }
         }
     };
@@ -110,7 +107,3 @@ macro_rules! numbered {
 
 numbered!(PyAttachmentHandle, "AttachmentHandle", "an attachment", DeformableAttachmentHandle);
 numbered!(PyCableHandle, "CableHandle", "a cable", DeformableCableHandle);
-
-fn internal(error: postcard::Error) -> PyErr {
-    pyo3::exceptions::PyRuntimeError::new_err(error.to_string())
-}

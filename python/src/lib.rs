@@ -6,6 +6,7 @@
 //! | `errors`, `arrays`, `options`, `enums`, `handles` | what goes between Python and Rust |
 //! | `world`, `snapshots`, `counters`, `batch` | the world, its bytes, what a step did, many worlds |
 //! | `bodies`, `sets` | putting things in and out, and finding them |
+//! | `bulk` | arrays that are filled, all bodies at once |
 //! | `rigid*`, `collider*`, `joint*` | rapier's |
 //! | `material`, `deformable*`, `attachments`, `cables`, `contacts`, `events` | foible3d's |
 //! | `wind`, `queries`, `recording` | air, rays, files |
@@ -17,6 +18,7 @@ mod arrays;
 mod attachments;
 mod batch;
 mod bodies;
+mod bulk;
 mod cables;
 mod collider;
 mod collider_builder;
@@ -92,6 +94,8 @@ mod native {
     use crate::material::PyMaterial;
     #[pymodule_export]
     use crate::queries::PySurfacePoint;
+    #[pymodule_export]
+    use crate::recording::PyReplay;
     #[pymodule_export]
     use crate::rigid::PyRigidBody;
     #[pymodule_export]

@@ -31,8 +31,7 @@ impl World {
     /// match. ``soft_parts`` is a TOML file of soft parts beside it (MJCF's own ``flexcomp`` elements are soft parts too).
     /// ``position`` [m] is where the file's origin is; ``multibody`` solves its joints in their coordinates, else by forces between free
     /// bodies; ``fixed_base`` holds the root. A soft part does not touch the link that carries it.
-    ///
-    /// A world with robots cannot be saved, copied or pickled: which pairs do not touch is not part of a snapshot.
+    /// It is saved with the world, and is among the ``robots`` of what is loaded.
     #[pyo3(signature = (file, *, soft_parts = None, position = Triple([0.0; 3]), multibody = true, fixed_base = false))]
     fn add_robot(
         slf: &Bound<'_, Self>,
@@ -57,6 +56,13 @@ impl World {
             Ok(robot)
         })?;
         Ok(PyRobot { world: slf.clone().unbind(), robot: robot.map_err(refused)? })
+    }
+
+    /// The robots that were put in by `add_robot`, in that order.
+    #[getter]
+    fn robots(slf: &Bound<'_, Self>) -> PyResult<Vec<PyRobot>> {
+        let robots = slf.get().with(slf.py(), |inner| inner.robots.clone())?;
+        Ok(robots.into_iter().map(|robot| PyRobot { world: slf.clone().unbind(), robot }).collect())
     }
 }
 

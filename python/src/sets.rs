@@ -100,7 +100,7 @@ set! {
     AttachmentSet = "AttachmentSet", PyAttachmentHandle, Attachment, "attachment",
     |inner, handle| inner.deformables.bodies.attachment(handle.0).is_some(),
     |inner| inner.deformables.bodies.attachments().map(|(handle, _)| PyAttachmentHandle(handle)).collect(),
-    |handle| (handle.id().unwrap_or(u64::MAX) as u32, 0)
+    |handle| (handle.id() as u32, 0)
 }
 
 set! {
@@ -108,7 +108,7 @@ set! {
     CableSet = "CableSet", PyCableHandle, Cable, "cable",
     |inner, handle| inner.deformables.bodies.cable(handle.0).is_some(),
     |inner| inner.deformables.bodies.cables().map(|(handle, _)| PyCableHandle(handle)).collect(),
-    |handle| (handle.id().unwrap_or(u64::MAX) as u32, 0)
+    |handle| (handle.id() as u32, 0)
 }
 
 #[pymethods]

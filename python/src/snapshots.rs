@@ -2,23 +2,21 @@
 
 use crate::errors::exceptions::SnapshotError;
 use crate::world::Inner;
+use foible_robots::Robot;
 use pyo3::prelude::*;
+use std::sync::Arc;
 
 /// What every snapshot begins with.
 const MAGIC: &[u8; 8] = b"foible3d";
 /// The layout of what follows; one more with every change of it, in the crate, in rapier or here.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// A world as bytes.
 pub fn save(inner: &Inner) -> PyResult<Vec<u8>> {
-    if !inner.robots.is_empty() {
-        let why = "the world cannot be saved: it has robots from files, and which of their pairs do not touch is not part of a snapshot";
-        return Err(SnapshotError::new_err(why));
-    }
     let mut bytes = MAGIC.to_vec();
     bytes.extend(VERSION.to_le_bytes());
-    let both = (&inner.physics, &inner.deformables);
-    postcard::to_extend(&both, bytes)
+    let robots: Vec<&Robot> = inner.robots.iter().map(Arc::as_ref).collect();
+    postcard::to_extend(&(&inner.physics, &inner.deformables, robots), bytes)
         .map_err(|error| SnapshotError::new_err(format!("the world cannot be saved: {error}")))
 }
 
@@ -37,8 +35,10 @@ pub fn load(bytes: &[u8]) -> PyResult<Inner> {
             "the snapshot is of version {version}; this package reads version {VERSION}"
         ));
     }
-    match postcard::take_from_bytes(rest) {
-        Ok(((physics, deformables), [])) => Ok(Inner { physics, deformables, robots: Vec::new() }),
+    match postcard::take_from_bytes::<(_, _, Vec<Robot>)>(rest) {
+        Ok(((physics, deformables, robots), [])) => {
+            Ok(Inner { physics, deformables, robots: robots.into_iter().map(Arc::new).collect() })
+        }
         Ok((_, left)) => refused(format!("{} bytes are left behind the snapshot", left.len())),
         Err(error) => refused(format!("the snapshot is damaged: {error}")),
     }

@@ -237,7 +237,7 @@ impl World {
         crate::counters::as_dict(py, &counters)
     }
 
-    /// The world as bytes: bodies, colliders, joints, attachments, parameters and velocities, all that decides what
+    /// The world as bytes: bodies, colliders, joints, attachments, robots, parameters and velocities, all that decides what
     /// comes next. ``World.restore`` makes a world of them, which goes on with the same bits. Bytes of another version of this
     /// package are refused.
     fn snapshot<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, pyo3::types::PyBytes>> {

@@ -9,6 +9,7 @@ import pytest
 
 gymnasium = pytest.importorskip("gymnasium", minversion="1.1")
 
+import foible3d as f  # noqa: E402
 import foible3d.gym as soft  # noqa: E402
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
@@ -23,6 +24,63 @@ def test_gymnasiums_checker_finds_nothing(name):
         check_env(env.unwrapped)
     env.reset(seed=1)
     assert env.spec.max_episode_steps == env.unwrapped.max_episode_steps
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_pictures_show_what_moves(name):
+    env = gymnasium.make(name, render_mode="rgb_array")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
+    env.reset(seed=1)
+    first, again = env.render(), env.render()
+    assert first.shape == (360, 480, 3) and first.dtype == np.uint8 and (first == again).all()
+    # Soft bodies are the only coloured things.
+    coloured = np.ptp(first.astype(int), axis=2) > 60
+    assert 200 < coloured.sum() < coloured.size / 2
+    for _ in range(10):
+        env.step(np.array([1.0, -1.0, 1.0, -1.0])[: env.action_space.shape[0]])
+    moved = (env.render() != first).any(axis=2)
+    assert 200 < moved.sum() < moved.size / 2
+    assert gymnasium.make(name).unwrapped.render() is None
+
+
+def test_a_picture_shows_a_ball_where_it_is():
+    world = f.World()
+    radius = 0.1
+    world.add_body(f.RigidBody.fixed(translation=(0.5, 2.0, -1.0)), [f.Collider.ball(radius)])
+    picture = world.render((300, 200), center=(0.5, 2.0, -1.0), radius=2 * radius, yaw=20, pitch=10)
+    seen = (picture != picture[0, 0]).any(axis=2)
+    rows, columns = np.nonzero(seen)
+    # In the middle. The camera sees the ball of twice the radius to the edge: of tan = 0.36, at a distance of 2 r √(1 + 0.36²) / 0.36, so
+    # the ball is the cone of sin = r / distance; and a polyhedron within it.
+    assert abs(rows.mean() - 99.5) < 0.6 and abs(columns.mean() - 149.5) < 0.6
+    sine = 0.5 * 0.36 / np.hypot(1.0, 0.36)
+    pixels = 100 * sine / np.sqrt(1.0 - sine**2) / 0.36
+    assert np.sqrt(seen.sum() / np.pi) == pytest.approx(pixels, rel=0.02)
+    # A body aside of it is seen beside it: along x to the right.
+    world.add_body(f.RigidBody.fixed(translation=(0.6, 2.0, -1.0)), [f.Collider.ball(0.02)])
+    world.add_body(f.RigidBody.fixed(translation=(0.5, 2.15, -1.0)), [f.Collider.ball(0.02)])
+    both = (world.render((300, 200), center=(0.5, 2.0, -1.0), radius=2 * radius, yaw=20, pitch=10) != picture).any(axis=2)
+    assert both[:80].any() and both[:, 180:].any() and not both[120:].any() and not both[:, :120].any()
+
+
+def test_pictures_that_cannot_be_are_refused():
+    world = f.World()
+    # Nothing but the background.
+    assert (world.render((16, 16)) == world.render((16, 16))[0, 0]).all()
+    for options, text in [
+        ({"size": (15, 480)}, "width is 15 pixels, but must be 16 to 4096"),
+        ({"size": (480, 5000)}, "height is 5000 pixels"),
+        ({"center": (0, 0, 0)}, "tell both, or neither"),
+        ({"center": (0, 0, 0), "radius": 0.0}, "radius is 0, but must be positive"),
+        ({"center": (0, float("nan"), 0), "radius": 1.0}, "center is not finite"),
+        ({"yaw": float("inf")}, "yaw is not finite"),
+    ]:
+        with pytest.raises(f.DeformableBodyError, match=text):
+            world.render(**options)
+    with pytest.raises(ValueError, match="render_mode is 'human'"):
+        soft.Lift(render_mode="human")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -57,7 +115,10 @@ def test_many_worlds_give_the_bits_of_each():
         assert (observations == np.stack([each[0] for each in mine])).all()
         assert rewards.tolist() == [each[1] for each in mine]
     assert not over.any() and not cut.any() and infos["is_success"].tolist() == [False] * 3
-    assert envs.observation_space.contains(observations)
+    assert envs.observation_space.contains(observations) and envs.render() is None
+    pictures = gymnasium.make_vec("foible3d/Lift-v0", num_envs=2, render_mode="rgb_array")
+    pictures.reset(seed=5)
+    assert [picture.shape for picture in pictures.render()] == [(360, 480, 3)] * 2
 
 
 def test_an_episode_that_ends_begins_anew_in_the_next_step():

@@ -7,6 +7,7 @@ use thiserror::Error;
 
 /// A place in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct Place {
     /// The file, or what stands for it where a text was given.
     pub file: PathBuf,
@@ -128,6 +129,7 @@ pub enum RobotError {
 
 /// Something in a file that was left out or taken otherwise than it says.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct Warning {
     /// Where.
     pub place: Place,

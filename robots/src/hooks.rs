@@ -8,9 +8,13 @@ use foible3d::{
     DeformableBodyHandle, DeformableContactModificationContext, DeformableHooks, DeformablePairFilterContext,
 };
 use rapier3d::dynamics::RigidBodyHandle;
+#[cfg(feature = "serde-serialize")]
+use rapier3d::geometry::ColliderHandle;
 use rapier3d::geometry::SolverFlags;
 use rapier3d::pipeline::{ContactModificationContext, PairFilterContext, PhysicsHooks};
 use rapier3d_mjcf::MjcfContactHooks;
+#[cfg(feature = "serde-serialize")]
+use rapier3d_mjcf::PairOverride;
 use std::collections::HashSet;
 
 /// The hooks of a robot, for [`DeformableWorld::step_with_events`](foible3d::DeformableWorld::step_with_events): pairs that
@@ -22,6 +26,46 @@ use std::collections::HashSet;
 pub struct RobotHooks {
     apart: HashSet<(DeformableBodyHandle, RigidBodyHandle)>,
     file: MjcfContactHooks,
+}
+
+/// What hooks hold, in order: pairs kept apart, pairs of colliders that a file excludes, and those that it gives a friction.
+#[cfg(feature = "serde-serialize")]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
+pub(crate) struct Pairs {
+    pub apart: Vec<(DeformableBodyHandle, RigidBodyHandle)>,
+    pub excluded: Vec<(ColliderHandle, ColliderHandle)>,
+    pub frictions: Vec<(ColliderHandle, ColliderHandle, Option<f32>)>,
+}
+
+#[cfg(feature = "serde-serialize")]
+impl RobotHooks {
+    /// All pairs; those of the file are among these colliders.
+    pub(crate) fn pairs(&self, colliders: &[ColliderHandle]) -> Pairs {
+        let mut pairs = Pairs { apart: self.apart.iter().copied().collect(), ..Pairs::default() };
+        // The same bytes on every run.
+        pairs.apart.sort_unstable_by_key(|(part, link)| (*part, link.into_raw_parts()));
+        for (k, a) in colliders.iter().enumerate() {
+            for b in &colliders[k..] {
+                if self.file.is_excluded(*a, *b) {
+                    pairs.excluded.push((*a, *b));
+                }
+                if let Some(own) = self.file.pair_override(*a, *b) {
+                    pairs.frictions.push((*a, *b, own.friction));
+                }
+            }
+        }
+        pairs
+    }
+
+    /// Of such pairs.
+    pub(crate) fn of_pairs(pairs: &Pairs) -> Self {
+        let mut file = MjcfContactHooks::new();
+        pairs.excluded.iter().for_each(|(a, b)| file.exclude(*a, *b));
+        for (a, b, friction) in &pairs.frictions {
+            file.add_override(*a, *b, PairOverride { friction: *friction });
+        }
+        Self { apart: pairs.apart.iter().copied().collect(), file }
+    }
 }
 
 impl RobotHooks {

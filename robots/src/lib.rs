@@ -10,6 +10,7 @@
 //! | `urdf`, `mjcf` | the two kinds of file, checked |
 //! | `hooks` | which pairs of a soft part and a link do not touch |
 //! | `robot`, `motor`, `passive` | links, joints and parts by name; motors, springs and damping |
+//! | `saved` | robots as what is saved of them, feature `serde-serialize` |
 //! | `builder` | the way in |
 //!
 //! What a file says and this package does not do is an error, or one of [`Robot::warnings`].
@@ -29,6 +30,9 @@ mod hooks;
 mod motor;
 mod passive;
 mod robot;
+
+#[cfg(feature = "serde-serialize")]
+mod saved;
 
 mod builder;
 

@@ -12,6 +12,7 @@ use rapier3d::pipeline::PhysicsWorld;
 
 /// A joint's spring and damping.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Passive {
     /// [N/m] or [N m/rad]
     pub stiffness: f32,

@@ -9,6 +9,7 @@ use rapier3d_urdf::{UrdfMultibodyOptions, UrdfRobot};
 
 /// A joint in rapier's sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub enum RobotJointHandle {
     /// Among the impulse joints.
     Impulse(ImpulseJointHandle),

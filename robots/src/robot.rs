@@ -12,6 +12,7 @@ use rapier3d::pipeline::PhysicsWorld;
 
 /// A link.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct RobotLink {
     /// Its name in the file; `world` for what MJCF puts there.
     pub name: String,
@@ -23,6 +24,7 @@ pub struct RobotLink {
 
 /// A joint.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct RobotJoint {
     /// Its name in the file; empty for those that hold a body of an MJCF file without joints.
     pub name: String,
@@ -43,6 +45,7 @@ pub struct RobotJoint {
 
 /// A soft part.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct RobotPart {
     /// Its name in the file.
     pub name: String,
@@ -56,7 +59,15 @@ pub struct RobotPart {
 }
 
 /// A robot in a world, made by [`RobotBuilder`](crate::RobotBuilder).
+///
+/// With the feature `serde-serialize` it is saved beside the worlds that it is in: names, joints and hooks; what is loaded is refused where
+/// a number is none that a file can give.
 #[derive(Clone, Debug)]
+#[cfg_attr(
+    feature = "serde-serialize",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "crate::saved::SavedRobot", into = "crate::saved::SavedRobot")
+)]
 pub struct Robot {
     pub(crate) links: Vec<RobotLink>,
     pub(crate) joints: Vec<RobotJoint>,

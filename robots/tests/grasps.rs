@@ -212,9 +212,9 @@ fn ten_grasps_hold() {
     check(10, 7);
 }
 
-/// Some twenty minutes on one core: the finer pads of a quarter of them take most of it.
+/// Some twelve minutes on one core: the finer pads of a quarter of them take most of it.
 #[test]
-#[ignore = "some twenty minutes"]
+#[ignore = "some twelve minutes"]
 fn two_hundred_grasps_hold() {
     check(200, 8);
 }

@@ -1,6 +1,8 @@
 //! Vertices attached to rigid bodies, to the world, or to other deformable bodies.
 
+use super::body::in_range;
 use super::handle::{DeformableAttachmentHandle, DeformableBodyHandle};
+use crate::error::BodyError;
 use crate::math::{Pose64, Vec3, to_real};
 use rapier3d::dynamics::RigidBodyHandle;
 use rapier3d::math::{Pose, Vector};
@@ -60,6 +62,11 @@ pub(crate) struct PrescribedNode {
     pub attachment: DeformableAttachmentHandle,
 }
 
+/// Numbers that infinity is among.
+fn from_zero(quantity: &'static str, value: f64) -> Result<(), BodyError> {
+    in_range(quantity, value, "zero or positive", value >= 0.0)
+}
+
 impl DeformableAttachment {
     /// A hard one.
     pub(super) fn new(body: DeformableBodyHandle, nodes: Vec<u32>, anchors: Anchors) -> Self {
@@ -101,10 +108,15 @@ impl DeformableAttachment {
         self.compliance
     }
 
-    /// Changes the compliance [m/N]; negative values and NaN are taken for zero, infinity lets go.
-    pub fn set_compliance(&mut self, compliance: f64) {
-        self.compliance = compliance.max(0.0);
+    /// Changes the compliance [m/N]; zero is hard, infinity lets go.
+    ///
+    /// # Errors
+    /// [`BodyError::OutOfRange`] for what is negative or NaN; nothing is changed then. Also of the other setters.
+    pub fn set_compliance(&mut self, compliance: f64) -> Result<(), BodyError> {
+        from_zero("compliance", compliance)?;
+        self.compliance = compliance;
         self.changed = true;
+        Ok(())
     }
 
     /// How far the vertices may go from their places \[m\]; zero keeps them there.
@@ -113,10 +125,15 @@ impl DeformableAttachment {
     }
 
     /// Makes cables of the attachment, of this length \[m\]: they hold the vertices within it and push nothing. Without
-    /// a compliance they do not stretch, whatever they carry. Negative values and NaN are taken for zero.
-    pub fn set_length(&mut self, length: f64) {
-        self.length = length.max(0.0);
+    /// a compliance they do not stretch, whatever they carry. Infinity lets go.
+    ///
+    /// # Errors
+    /// As [`DeformableAttachment::set_compliance`].
+    pub fn set_length(&mut self, length: f64) -> Result<(), BodyError> {
+        from_zero("length", length)?;
+        self.length = length;
         self.changed = true;
+        Ok(())
     }
 
     /// Total force \[N\] at which the attachment breaks; infinite if it does not.
@@ -124,10 +141,15 @@ impl DeformableAttachment {
         self.break_force
     }
 
-    /// Changes the breaking force \[N\].
-    pub fn set_break_force(&mut self, force: f64) {
+    /// Changes the breaking force \[N\]; with infinity nothing breaks it.
+    ///
+    /// # Errors
+    /// As [`DeformableAttachment::set_compliance`].
+    pub fn set_break_force(&mut self, force: f64) -> Result<(), BodyError> {
+        from_zero("break_force", force)?;
         self.changed = true;
         self.break_force = force;
+        Ok(())
     }
 
     /// Force \[N\] on the body in the last step, summed over its vertices.
@@ -210,7 +232,7 @@ impl DeformableAttachment {
             Anchors::Deformable(..) => &[],
         };
         let are_points = points.iter().chain([&self.force]).all(super::snapshot::is_finite);
-        are_points && self.compliance >= 0.0 && self.length >= 0.0
+        are_points && self.compliance >= 0.0 && self.length >= 0.0 && self.break_force >= 0.0
     }
 
     /// Breaks under the force of a step, if that is too large.

@@ -286,6 +286,19 @@ pub(super) fn rotation(quantity: &'static str, value: Rotation) -> Result<(), Bo
     }
 }
 
+/// A number of the user's, if it is in its range.
+pub(super) fn in_range(
+    quantity: &'static str,
+    value: f64,
+    wanted: &'static str,
+    is_in: bool,
+) -> Result<(), BodyError> {
+    match is_in {
+        true => Ok(()),
+        false => Err(BodyError::OutOfRange { quantity, value, wanted }),
+    }
+}
+
 /// A vector of the user's, widened if it is one.
 pub(super) fn finite(quantity: &'static str, value: Vector) -> Result<Vec3, BodyError> {
     match value.is_finite() {

@@ -275,7 +275,7 @@ impl DeformableBodyBuilder {
         self
     }
 
-    /// Sets the factor on gravity; a non-finite one is taken as zero.
+    /// Sets the factor on gravity.
     pub fn gravity_scale(mut self, scale: f64) -> Self {
         self.gravity_scale = scale;
         self
@@ -345,7 +345,7 @@ impl DeformableBodyBuilder {
     /// Makes the body.
     ///
     /// # Errors
-    /// What is wrong with the mesh or the material, or a pose or velocity that is not finite.
+    /// What is wrong with the mesh or the material, or a pose, velocity or factor on gravity that is not finite.
     pub fn build(&self) -> Result<DeformableBody, DeformableBodyError> {
         self.material.validate()?;
         let mut body = DeformableBody::new(self.model.clone()?, self.material);
@@ -359,7 +359,7 @@ impl DeformableBodyBuilder {
         body.set_body_type(self.body_type);
         body.set_vels(self.linvel, self.angvel)?;
         body.set_settings(self.settings);
-        body.set_gravity_scale(self.gravity_scale);
+        body.set_gravity_scale(self.gravity_scale)?;
         body.set_enabled(self.enabled);
         body.set_can_sleep(self.can_sleep);
         body.set_self_contact(self.self_contact);

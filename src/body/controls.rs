@@ -1,6 +1,6 @@
 //! What its user sets of a body besides its motion.
 
-use super::body::DeformableBody;
+use super::body::{DeformableBody, in_range};
 use super::settings::{Acceleration, SolverSettings};
 use crate::error::{BodyError, DeformableBodyError};
 use crate::material::{DeformableMaterial, MaterialError};
@@ -109,10 +109,15 @@ impl DeformableBody {
         self.activation
     }
 
-    /// Sets the stretch that muscle fibres want to have; brought into 0 to 10, one if it is NaN.
-    pub fn set_activation(&mut self, stretch: f64) {
+    /// Sets the stretch that muscle fibres want to have, from 0 to 10.
+    ///
+    /// # Errors
+    /// [`BodyError::OutOfRange`]; nothing is changed then.
+    pub fn set_activation(&mut self, stretch: f64) -> Result<(), BodyError> {
+        in_range("activation", stretch, "from 0 to 10", (0.0..=10.0).contains(&stretch))?;
         self.wake_up();
-        self.activation = if stretch.is_nan() { 1.0 } else { stretch.clamp(0.0, 10.0) };
+        self.activation = stretch;
+        Ok(())
     }
 
     /// Factor on gravity.
@@ -120,10 +125,15 @@ impl DeformableBody {
         self.gravity_scale
     }
 
-    /// Sets the factor on gravity; a non-finite one is taken as zero.
-    pub fn set_gravity_scale(&mut self, scale: f64) {
+    /// Sets the factor on gravity, negative ones too.
+    ///
+    /// # Errors
+    /// [`BodyError::OutOfRange`] for one that is not finite; nothing is changed then.
+    pub fn set_gravity_scale(&mut self, scale: f64) -> Result<(), BodyError> {
+        in_range("gravity_scale", scale, "finite", scale.is_finite())?;
         self.wake_up();
-        self.gravity_scale = if scale.is_finite() { scale } else { 0.0 };
+        self.gravity_scale = scale;
+        Ok(())
     }
 
     /// Whether the body takes part in the simulation.

@@ -33,10 +33,34 @@ impl DeformableBodyHandle {
 #[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct DeformableAttachmentHandle(pub(crate) u64);
 
+impl DeformableAttachmentHandle {
+    /// Its number: how many attachments the set had been given before it.
+    pub fn into_raw_parts(self) -> u64 {
+        self.0
+    }
+
+    /// Of a number, as [`DeformableAttachmentHandle::into_raw_parts`] gives it.
+    pub fn from_raw_parts(number: u64) -> Self {
+        Self(number)
+    }
+}
+
 /// Names a cable of a [`DeformableBodySet`](super::DeformableBodySet); never used again after its removal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
 pub struct DeformableCableHandle(pub(crate) u64);
+
+impl DeformableCableHandle {
+    /// Its number: how many cables the set had been given before it.
+    pub fn into_raw_parts(self) -> u64 {
+        self.0
+    }
+
+    /// Of a number, as [`DeformableCableHandle::into_raw_parts`] gives it.
+    pub fn from_raw_parts(number: u64) -> Self {
+        Self(number)
+    }
+}
 
 /// What a deformable body touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -208,6 +208,39 @@ impl DeformableBody {
         Ok(())
     }
 
+    /// Moves all vertices \[m\] as [`DeformableBody::set_position`] does each.
+    ///
+    /// # Errors
+    /// [`BodyError::WrongSize`], [`BodyError::NotFinite`]; nothing is changed then.
+    pub fn set_positions(&mut self, positions: &[[f64; 3]]) -> Result<(), BodyError> {
+        self.check_all("position", positions)?;
+        (0..).zip(positions).try_for_each(|(vertex, x)| self.set_position(vertex, *x))
+    }
+
+    /// Sets the velocities of all vertices [m/s], to the last bit that [`DeformableBody::velocity`] reads.
+    ///
+    /// # Errors
+    /// [`BodyError::WrongSize`], [`BodyError::NotFinite`]; nothing is changed then.
+    pub fn set_velocities(&mut self, velocities: &[[f64; 3]]) -> Result<(), BodyError> {
+        self.check_all("velocity", velocities)?;
+        if self.takes_velocities() {
+            for (vertex, velocity) in velocities.iter().enumerate() {
+                let node = self.node(vertex)?;
+                self.state.v[node] = (*velocity).into();
+            }
+        }
+        Ok(())
+    }
+
+    /// That there are as many as vertices, and all finite in rapier's precision.
+    fn check_all(&self, quantity: &'static str, values: &[[f64; 3]]) -> Result<(), BodyError> {
+        let (vertices, expected) = (values.len(), self.vertex_count());
+        if vertices != expected {
+            return Err(BodyError::WrongSize { vertices, expected });
+        }
+        values.iter().try_for_each(|value| finite(quantity, to_real(&(*value).into())).map(drop))
+    }
+
     /// Puts the body where its rest shape would be at a pose, deformation and all: [`DeformableBody::teleport`] from
     /// [`DeformableBody::pose`].
     ///

@@ -56,7 +56,7 @@ impl DeformableDrag {
             hit.or_else(|| vertex_beside(bodies, eye, direction, max_distance))?;
         let stiffness = bodies.get(body)?.mass() * (TAU * FREQUENCY).powi(2);
         let attachment = bodies.attach(body, &vertices, AttachTo::World).ok()?;
-        bodies.attachment_mut(attachment)?.set_compliance(vertices.len() as f64 / stiffness);
+        bodies.attachment_mut(attachment)?.set_compliance(vertices.len() as f64 / stiffness).ok()?;
         Some(Self { body, attachment, at: eye + direction * distance, distance })
     }
 

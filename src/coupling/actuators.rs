@@ -141,8 +141,8 @@ impl DeformableActuators {
     /// Adds a signal that is at `start`, changes by no more than `rate` per second (infinite: at once), and stays in a range.
     ///
     /// # Errors
-    /// [`ActuatorError::Duplicate`]; [`ActuatorError::BadNumber`] for a range that is empty or not finite, a start outside
-    /// of it, and a rate that is not positive.
+    /// [`ActuatorError::Duplicate`]; [`ActuatorError::BadNumber`] for a range that is empty or not finite, or for an
+    /// activation beyond 0 to 10, a start outside of it, and a rate that is not positive.
     pub fn insert(
         &mut self,
         name: &str,
@@ -160,6 +160,10 @@ impl DeformableActuators {
         }
         if !(range[0] <= start && start <= range[1]) {
             return Err(bad("start, which is outside of the range,", start));
+        }
+        let beyond = range.into_iter().find(|value| !(0.0..=10.0).contains(value));
+        if let (Actuator::Activation(_), Some(value)) = (actuator, beyond) {
+            return Err(bad("range, which for an activation is within 0 and 10,", value));
         }
         if self.signals.contains_key(name) {
             return Err(ActuatorError::Duplicate { name: name.to_string() });
@@ -230,10 +234,7 @@ impl Actuator {
             }
             Self::CableTension(cable) => bodies.cable_mut(cable)?.set_tension(value).ok(),
             Self::CableLength(cable) => bodies.cable_mut(cable)?.set_length(value).ok(),
-            Self::Activation(body) => {
-                bodies.get_mut(body)?.set_activation(value);
-                Some(())
-            }
+            Self::Activation(body) => bodies.get_mut(body)?.set_activation(value).ok(),
             Self::JointPosition(joint, axis) => {
                 axis.lead(&mut parts.impulse_joints.get_mut(joint, true)?.data, value);
                 Some(())

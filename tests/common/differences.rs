@@ -108,7 +108,7 @@ impl Scene {
             body.set_velocity(vertex, Vector::new(run.launch[0] as f32, y as f32, 0.0)).unwrap();
         }
         body.add_force(&[tip], Vector::Z * run.push as f32).unwrap();
-        body.set_activation(run.activation);
+        body.set_activation(run.activation).unwrap();
         for vertex in body.pinned().collect::<Vec<_>>() {
             body.set_velocity(vertex, Vector::ZERO).unwrap();
             body.set_pin_velocity(vertex, Vector::Z * run.lead as f32).unwrap();

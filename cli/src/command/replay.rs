@@ -1,7 +1,7 @@
 //! `foible replay`.
 
 use super::{MET, parse_set};
-use crate::picture::{Film, Look};
+use crate::picture::{Film, Look, write_gif, write_png};
 use crate::run::{RunOptions, run};
 use crate::scene::SceneFile;
 use std::path::PathBuf;
@@ -64,11 +64,11 @@ impl Replay {
         let look = Look { size: self.size, yaw: self.yaw, pitch: self.pitch };
         let film = Film::new(&replay, look);
         if let Some(path) = &self.png {
-            film.write_png(path, self.at.unwrap_or(f64::INFINITY))?;
+            write_png(&film, path, self.at.unwrap_or(f64::INFINITY))?;
             say!("{} is written", path.display());
         }
         if let Some(path) = &self.gif {
-            film.write_gif(path)?;
+            write_gif(&film, path)?;
             say!("{} is written", path.display());
         }
         Ok(MET)

@@ -4,13 +4,9 @@ use super::plot::{Line, lines};
 use crate::baseline::Drift;
 use crate::run::number;
 use crate::run::{Costs, Measured, Outcome, Trace};
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
+use foible_replay::{PLAYER_SECTION, player_scripts};
+pub(super) use foible_replay::{escaped, page};
 use std::fmt::Write as _;
-
-const STYLE: &str = include_str!("style.css");
-const TABLES: &str = include_str!("tables.js");
-const PLAYER: &str = include_str!("player.js");
 
 /// What a page of a run is made of.
 #[derive(Clone, Copy, Debug)]
@@ -25,22 +21,6 @@ pub struct PageOfRun<'a> {
     pub drifts: &'a [Drift],
     /// The bytes of a replay.
     pub replay: Option<&'a [u8]>,
-}
-
-/// Text within HTML.
-pub(super) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
-/// A whole page.
-pub(super) fn page(title: &str, body: &str, scripts: &str) -> String {
-    format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{}</title>\n\
-         <link rel=\"icon\" href=\"data:,\">\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n{body}</main>\n\
-         <script>\n{TABLES}</script>\n{scripts}</body>\n</html>\n",
-        escaped(title)
-    )
 }
 
 /// A cell that sorts by its number.
@@ -70,7 +50,7 @@ pub fn page_of_run(run: &PageOfRun<'_>) -> String {
         let _ = writeln!(body, "<p class=\"failed\">{}</p>", escaped(error));
     }
     if run.replay.is_some() {
-        body.push_str(include_str!("player.html"));
+        body.push_str(PLAYER_SECTION);
     }
     add_verdicts(&mut body, outcome);
     add_drifts(&mut body, run.drifts);
@@ -85,14 +65,7 @@ pub fn page_of_run(run: &PageOfRun<'_>) -> String {
         outcome.steps,
         outcome.dt * 1e3
     );
-    let mut scripts = String::new();
-    if let Some(replay) = run.replay {
-        let data = STANDARD.encode(replay);
-        let _ = writeln!(
-            scripts,
-            "<script id=\"replay-data\" type=\"text/plain\">{data}</script>\n<script>\n{PLAYER}</script>"
-        );
-    }
+    let scripts = run.replay.map_or(String::new(), player_scripts);
     page(&outcome.title(), &body, &scripts)
 }
 

@@ -4,7 +4,6 @@ mod digest;
 mod filter;
 mod number;
 mod outcome;
-mod packed;
 mod recorded;
 mod replay;
 mod signals;
@@ -12,9 +11,10 @@ mod trace;
 
 pub use digest::key;
 pub use filter::channel_filter;
+pub use foible_replay::{Replay, ReplayFrame, ReplayMesh};
 pub use number::number;
 pub use outcome::{Costs, Measured, Outcome, Verdict};
-pub use replay::{Replay, ReplayFrame, ReplayMesh, replay_rate};
+pub use replay::replay_rate;
 pub use trace::Trace;
 
 use crate::scene::{Expect, Kind, Quantity, Scene, SceneFile};
@@ -95,7 +95,7 @@ fn steps(
     let mut watched = scene.measure.iter().chain(&scene.expect);
     let watches_losses = watched.any(|e| e.quantity.as_ref().is_of_steps());
     run.trace = Trace::new(stage);
-    run.replay = (options.replay_rate > 0.0).then(|| Replay::new(scene, stage, options.replay_rate));
+    run.replay = (options.replay_rate > 0.0).then(|| replay::replay_of(scene, stage, options.replay_rate));
     for step in 1..=steps {
         if options.progress.is_some_and(|goes_on| !goes_on(step - 1)) {
             run.is_stopped = true;
@@ -113,7 +113,7 @@ fn steps(
         signals.record(stage);
         run.trace.record(time, stage);
         if let Some(replay) = &mut run.replay {
-            replay.record(time, stage);
+            replay.record(time, &stage.physics.bodies, &stage.physics.colliders, &stage.world);
         }
         run.outcome.steps = step;
         stage.pull_triggers(scene, time);

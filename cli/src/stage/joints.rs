@@ -59,9 +59,12 @@ impl Stage {
         let made = self.world.bodies.attach(*soft, &vertices, to);
         let handle = made.map_err(|e| format!("attach: \"{name}\": {e}"))?;
         if let Some(made) = self.world.bodies.attachment_mut(handle) {
-            attach.compliance.iter().for_each(|compliance| made.set_compliance(*compliance.as_ref()));
-            attach.length.iter().for_each(|length| made.set_length(*length.as_ref()));
-            attach.break_force.iter().for_each(|force| made.set_break_force(*force.as_ref()));
+            let mut set = || {
+                attach.compliance.iter().try_for_each(|c| made.set_compliance(*c.as_ref()))?;
+                attach.length.iter().try_for_each(|length| made.set_length(*length.as_ref()))?;
+                attach.break_force.iter().try_for_each(|force| made.set_break_force(*force.as_ref()))
+            };
+            set().map_err(|e: BodyError| format!("attach: \"{name}\": {e}"))?;
         }
         self.attachments.push((name.clone(), handle));
         Ok(())

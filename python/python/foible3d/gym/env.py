@@ -6,7 +6,7 @@ from gymnasium import spaces
 
 import foible3d as f
 
-from .scene import Scene, load
+from .scene import Scene, load, options
 
 # Beyond that observations are clipped: spaces are to be bounded.
 LARGEST = 1.0e6
@@ -23,18 +23,22 @@ class SoftEnv(gymnasium.Env):
       (x, y, z, w), ``pressure:NAME`` [Pa] and ``force:NAME`` [N] of pads, ``tension:NAME`` [N] of cables, ``signal:NAME`` in [-1, 1], and
       ``goal`` [m],
     - ``steps_per_action``: steps of the world in each of the environment; 4 unless told,
-    - ``max_episode_steps``.
+    - ``max_episode_steps``,
+    - ``render``: arguments of `foible3d.World.render` for pictures (``size``, ``center``, ``radius``, ``yaw``, ``pitch``); 480 by 360 pixels of
+      all that moves as an episode begins, and half as much around it, unless told.
 
-    A subclass tells ``reward`` and, if it wants to, ``sample_goal``, ``randomise``, ``disturb``, ``is_success`` and ``is_failure``.
+    With ``render_mode="rgb_array"`` ``render`` gives a picture, drawn without a window. A subclass tells ``reward`` and, if it wants to, ``sample_goal``, ``randomise``, ``disturb``, ``is_success`` and ``is_failure``.
     The same seed and actions give the same bits.
     """
 
-    metadata = {"render_modes": []}
+    metadata = {"render_modes": ["rgb_array"]}
     description = None
 
     def __init__(self, description=None, render_mode=None):
         told = self.description if description is None else description
         self.description = told if isinstance(told, dict) else load(told)
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(f"render_mode is {render_mode!r}, but must be None or 'rgb_array'")
         self.render_mode = render_mode
         self.scene = Scene(self.description)
         self._start = self.scene.world.snapshot()
@@ -45,12 +49,27 @@ class SoftEnv(gymnasium.Env):
         self._ranges = np.array([self.scene.world.actuators[name].range for name in self.actions]).reshape(-1, 2)
         self._observed = [(*name.partition(":")[::2], factor) for name, factor in env.get("observe", {}).items()]
         self._begin()
+        # Pictures a second, as fast as the world is.
+        rate = round(1.0 / (self.world.dt * self.steps_per_action))
+        self.metadata = {**self.metadata, "render_fps": max(rate, 1)}
+        self._look = {"size": (480, 360), **options(env.get("render", {}))}
+        if "center" not in self._look:
+            self._look["center"], self._look["radius"] = self._extent()
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.actions),), np.float32)
         self.observation_space = spaces.Box(-LARGEST, LARGEST, self.observation().shape, np.float32)
 
     def _begin(self):
         self.world = f.World.restore(self._start)
         self.goal = np.zeros(3)
+
+    def _extent(self):
+        """The middle of all that can move, and one and a half times the radius of the ball around it [m]."""
+        world = self.world
+        parts = [body.positions for _, body in world.deformable_bodies]
+        parts += [np.array([body.translation]) for _, body in world.rigid_bodies if body.body_type != f.RigidBodyType.FIXED]
+        points = np.concatenate(parts) if parts else np.zeros((1, 3))
+        low, high = points.min(axis=0), points.max(axis=0)
+        return tuple(0.5 * (low + high)), max(0.75 * float(np.linalg.norm(high - low)), 1e-3)
 
     # What a task is.
 
@@ -91,6 +110,10 @@ class SoftEnv(gymnasium.Env):
         self.command(action)
         self.world.step(self.steps_per_action)
         return self.result(action)
+
+    def render(self):
+        """A picture of now, an array of shape (height, width, 3) of bytes; None without ``render_mode="rgb_array"``."""
+        return self.world.render(**self._look) if self.render_mode == "rgb_array" else None
 
     def command(self, action):
         """What an action does before the world is stepped."""

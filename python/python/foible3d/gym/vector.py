@@ -20,7 +20,7 @@ class SoftVectorEnv(gymnasium.vector.VectorEnv):
         self.envs = [make() for _ in range(num_envs)]
         self.num_envs, self.threads = num_envs, threads
         self.metadata = {**self.envs[0].metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
-        self.render_mode = None
+        self.render_mode = self.envs[0].render_mode
         self.single_action_space = self.envs[0].action_space
         self.single_observation_space = self.envs[0].observation_space
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -57,6 +57,10 @@ class SoftVectorEnv(gymnasium.vector.VectorEnv):
             infos.append(info)
         self._ended = over | cut
         return np.stack(observations), rewards, over, cut, self._infos(infos)
+
+    def render(self):
+        """Pictures of all, of which each has its own; None without ``render_mode="rgb_array"``."""
+        return None if self.render_mode is None else tuple(env.render() for env in self.envs)
 
     def _infos(self, infos):
         told = {}

@@ -1,14 +1,28 @@
 //! From where a scene is seen.
 
+use crate::replay::UpAxis;
 use rapier3d::prelude::*;
 
 /// Tangent of half the angle from bottom to top.
 const HALF_VIEW: f32 = 0.36;
 
-/// A camera that looks at the middle of a box.
+/// To the light, where y is up.
+const TO_LIGHT: Vector = Vector::new(-0.42, 0.80, 0.42);
+
+/// A direction given with y up, in the world.
+fn upright(direction: Vector, up: UpAxis) -> Vector {
+    match up {
+        UpAxis::Y => direction,
+        UpAxis::Z => Vector::new(direction.z, direction.x, direction.y),
+    }
+}
+
+/// A camera that looks at the middle of a ball.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Camera {
     pub eye: Vector,
+    /// From what is seen to the light.
+    pub to_light: Vector,
     right: Vector,
     up: Vector,
     forward: Vector,
@@ -17,15 +31,16 @@ pub(super) struct Camera {
 }
 
 impl Camera {
-    /// So far away that the ball around the box is seen.
-    pub fn around(whole: &Aabb, yaw: f32, pitch: f32) -> Self {
+    /// So far away that the ball is seen.
+    pub fn around(center: Vector, radius: f32, yaw: f32, pitch: f32, up: UpAxis) -> Self {
         let back = Vector::new(pitch.cos() * yaw.sin(), pitch.sin(), pitch.cos() * yaw.cos());
-        let radius = whole.half_extents().length().max(1e-6);
+        let (back, to_light) = (upright(back, up), upright(TO_LIGHT, up));
+        let radius = radius.max(1e-6);
         let forward = -back;
-        let right = forward.cross(Vector::Y).normalize_or(Vector::X);
+        let right = forward.cross(upright(Vector::Y, up)).normalize_or(upright(Vector::X, up));
         let distance = radius * (1.0 + HALF_VIEW * HALF_VIEW).sqrt() / HALF_VIEW;
-        let (eye, up) = (whole.center() + back * distance, right.cross(forward));
-        Self { eye, right, up, forward, near: 0.01 * distance }
+        let (eye, up) = (center + back * distance, right.cross(forward));
+        Self { eye, to_light, right, up, forward, near: 0.01 * distance }
     }
 
     /// Along the picture, up, and the distance \[m\]; the last is negative behind the eye.

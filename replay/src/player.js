@@ -1,5 +1,5 @@
 "use strict";
-// Plays a replay: surfaces, contact forces and stress, drawn by WebGL2. The bytes are those of `run/packed.rs`.
+// Plays a replay: surfaces, contact forces and stress, drawn by WebGL2. The bytes are those of `packed.rs`.
 (async () => {
   const by = (id) => document.getElementById(id);
   const canvas = by("replay");
@@ -16,6 +16,9 @@
   let at = 4 + size;
   const take = (Kind, count) => { const got = new Kind(bytes, at, count); at += got.byteLength; return got; };
   const frames = head.times.length;
+  // A direction given with y up, in the world.
+  const upright = (v) => head.up === "z" ? [v[2], v[0], v[1]] : v;
+  const isIn = (mesh, f) => mesh.first <= f && f < mesh.end;
   const rigid = head.meshes.filter((m) => !m.soft), soft = head.meshes.filter((m) => m.soft);
   for (const mesh of head.meshes) mesh.index = take(Uint32Array, 3 * mesh.triangles);
   for (const mesh of rigid) mesh.rest = take(Float32Array, 3 * mesh.vertices);
@@ -47,7 +50,7 @@
   const surface = program(
     `in vec3 place; in float value; uniform mat4 view, model; out vec3 world; out float shade;
      void main() { vec4 w = model * vec4(place, 1.0); world = w.xyz; shade = value; gl_Position = view * w; }`,
-    `in vec3 world; in float shade; uniform vec3 color, eye; uniform float coloured; out vec4 result;
+    `in vec3 world; in float shade; uniform vec3 color, eye, sun; uniform float coloured; out vec4 result;
      vec3 heat(float t) {
        vec3 a = vec3(.29, .50, .71), b = vec3(.50, .77, .63), c = vec3(.95, .82, .29), d = vec3(.85, .28, .17);
        return t < .33 ? mix(a, b, t / .33) : t < .67 ? mix(b, c, (t - .33) / .34) : mix(c, d, (t - .67) / .33);
@@ -55,7 +58,7 @@
      void main() {
        vec3 n = normalize(cross(dFdx(world), dFdy(world)));
        if (dot(n, eye - world) < 0.0) n = -n;
-       float light = .45 + .4 * max(dot(n, normalize(vec3(-.4, .8, .45))), 0.0) + .15 * max(dot(n, normalize(eye - world)), 0.0);
+       float light = .45 + .4 * max(dot(n, normalize(sun)), 0.0) + .15 * max(dot(n, normalize(eye - world)), 0.0);
        result = vec4(mix(color, heat(shade * shade), coloured) * light, 1.0);
      }`);
   const line = program(`in vec3 place; uniform mat4 view; void main() { gl_Position = view * vec4(place, 1.0); }`,
@@ -112,8 +115,8 @@
   const middle = low.map((v, k) => 0.5 * (v + high[k])), reach = Math.hypot(...low.map((v, k) => high[k] - v)) / 2 || 1;
   let yaw = 0.6, pitch = 0.35, distance = 2.6 * reach;
   const view = () => {
-    const eye = sum(middle, [Math.cos(pitch) * Math.sin(yaw), Math.sin(pitch), Math.cos(pitch) * Math.cos(yaw)], distance);
-    const z = unit(sum(eye, middle, -1)), x = unit(cross([0, 1, 0], z)), y = cross(z, x);
+    const eye = sum(middle, upright([Math.cos(pitch) * Math.sin(yaw), Math.sin(pitch), Math.cos(pitch) * Math.cos(yaw)]), distance);
+    const z = unit(sum(eye, middle, -1)), x = unit(cross(upright([0, 1, 0]), z)), y = cross(z, x);
     const f = 1 / Math.tan(0.4), aspect = canvas.width / canvas.height, near = distance * 0.02, far = distance * 40;
     const rows = [sum([0, 0, 0], x, f / aspect), sum([0, 0, 0], y, f), z];
     const a = (far + near) / (near - far), b = (2 * far * near) / (near - far), m = new Array(16).fill(0);
@@ -139,7 +142,9 @@
     gl.useProgram(surface);
     gl.uniformMatrix4fv(uniform(surface, "view"), false, matrix);
     gl.uniform3fv(uniform(surface, "eye"), eye);
+    gl.uniform3fv(uniform(surface, "sun"), upright([-0.4, 0.8, 0.45]));
     rigid.forEach((mesh, m) => {
+      if (!isIn(mesh, f)) return;
       const of = (k) => poses.subarray(7 * (k * rigid.length + m), 7 * (k * rigid.length + m) + 7);
       const [p, q] = [[...of(f)], [...of(g)]], same = dot(p.slice(3), q.slice(3)) + p[6] * q[6] < 0 ? -1 : 1;
       const mixed = p.map((v, k) => v + t * ((k > 2 ? same : 1) * q[k] - v));
@@ -153,6 +158,7 @@
     gl.uniformMatrix4fv(uniform(surface, "model"), false, model([0, 0, 0, 0, 0, 0, 1]));
     gl.uniform1f(uniform(surface, "coloured"), by("stress").checked && head.stress > 0 ? 1 : 0);
     soft.forEach((mesh, m) => {
+      if (!isIn(mesh, f)) return;
       for (let v = 0; v < mesh.vertices; v++) {
         const [i, j] = [f * points + mesh.first + v, g * points + mesh.first + v];
         for (let k = 0; k < 3; k++) {

@@ -3,8 +3,6 @@
 use super::camera::Camera;
 use rapier3d::prelude::*;
 
-const TO_LIGHT: Vector = Vector::new(-0.42, 0.80, 0.42);
-
 /// Linear colours and depths.
 pub(super) struct Raster {
     width: usize,
@@ -26,7 +24,7 @@ impl Raster {
         }
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
         let toward = if normal.dot(camera.eye - corners[0]) < 0.0 { -normal } else { normal };
-        let light = 0.42 + 0.58 * toward.dot(TO_LIGHT).max(0.0);
+        let light = 0.42 + 0.58 * toward.dot(camera.to_light).max(0.0);
         let color = color.map(|c| c * light);
         let seen = camera.before_the_eye(corners.map(|corner| camera.frame(corner)));
         for k in 1..seen.len().saturating_sub(1) {
