@@ -64,7 +64,7 @@ impl Stage {
                 attach.length.iter().try_for_each(|length| made.set_length(*length.as_ref()))?;
                 attach.break_force.iter().try_for_each(|force| made.set_break_force(*force.as_ref()))
             };
-            set().map_err(|e: BodyError| format!("attach: \"{name}\": {e}"))?;
+            set().map_err(|e: foible3d::BodyError| format!("attach: \"{name}\": {e}"))?;
         }
         self.attachments.push((name.clone(), handle));
         Ok(())
