@@ -100,6 +100,7 @@ fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
         (body.body_type() != RigidBodyType::Dynamic, "the body is not dynamic"),
         (body.settings().integrator != Integrator::ImplicitEuler, "only implicit Euler has one"),
         (body.materials.iter().any(resists), "stiffness damping and Maxwell branches have none"),
+        (body.materials.iter().any(|m| m.orthotropic.is_some()), "woven sheets have none"),
         (body.fillings.iter().any(Option::is_some), "filled cavities have none"),
         (body.wind().is_some(), "wind has none"),
     ];

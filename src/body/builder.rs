@@ -199,6 +199,14 @@ impl DeformableBodyBuilder {
         self
     }
 
+    /// Sets the direction of the warp in woven sheets: what `direction` says of the place of a triangle's middle \[m\] in the rest shape,
+    /// projected on the triangle. See [`DeformableMaterial::orthotropic_sheet`]. A direction that is normal to its triangle is an
+    /// error of [`DeformableBodyBuilder::build`].
+    pub fn warp(mut self, direction: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
+        self.model = self.model.and_then(|model| model.with_warp(direction).map(Arc::new));
+        self
+    }
+
     /// Gives a region a material of its own; all others have that of [`DeformableBodyBuilder::material`].
     pub fn region_material(mut self, region: u32, material: DeformableMaterial) -> Self {
         self.region_materials.push((region, material));
@@ -352,6 +360,9 @@ impl DeformableBodyBuilder {
         for (region, material) in &self.region_materials {
             body.set_region_material(*region, *material)?;
         }
+        body.model()
+            .regions()
+            .try_for_each(|region| body.check_warp(body.region_material(region), region))?;
         for (cavity, filling) in &self.fillings {
             body.fill_cavity(*cavity, Some(*filling))?;
         }

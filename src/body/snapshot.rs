@@ -25,7 +25,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 /// Of what is written. Another one is refused: numbers of another layout would be read as something else.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// Comes first, so that nothing of another version is read.
 #[derive(Serialize)]
@@ -259,6 +259,9 @@ impl DeformableBody {
         let regions = &self.region_materials;
         if !(regions.is_sorted_by(|a, b| a.0 < b.0) && regions.iter().all(known)) {
             return Err("its regions are not those of its model".to_string());
+        }
+        for region in self.model.regions() {
+            self.check_warp(self.region_material(region), region).map_err(|error| error.to_string())?;
         }
         self.distribute_materials();
         self.state.check(&self.model).map_err(str::to_string)?;

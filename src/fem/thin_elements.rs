@@ -11,7 +11,11 @@ use crate::math::Vec3;
 
 /// The energy of a material's sheets.
 pub(super) fn membrane(material: &DeformableMaterial) -> Membrane {
-    Membrane::new(material.lame(), material.strain_limits, material.limit_weight())
+    let limits = material.strain_limits;
+    match &material.orthotropic {
+        None => Membrane::new(material.lame(), limits, material.limit_weight()),
+        Some(cloth) => Membrane::woven(cloth.plane_stress(), limits, cloth.limit_weight()),
+    }
 }
 
 /// What the weight per modulus of a stencil is to be multiplied by \[Pa\]. Two sides that differ share a moment, and each
