@@ -199,6 +199,14 @@ impl DeformableBodyBuilder {
         self
     }
 
+    /// Adds muscle fibres to the tetrahedra, along what `direction` says of the place of their middle \[m\] in the rest shape: see
+    /// [`DeformableModel::with_fibres`]. Their stiffness is the material's, by region; what they want
+    /// [`DeformableBody::set_activation`] and [`DeformableBody::set_region_activation`] say.
+    pub fn fibres(mut self, direction: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
+        self.model = self.model.map(|model| Arc::new((*model).clone().with_fibres(direction)));
+        self
+    }
+
     /// Sets the direction of the warp in woven sheets: what `direction` says of the place of a triangle's middle \[m\] in the rest shape,
     /// projected on the triangle. See [`DeformableMaterial::orthotropic_sheet`]. A direction that is normal to its triangle is an
     /// error of [`DeformableBodyBuilder::build`].

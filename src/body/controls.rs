@@ -79,6 +79,7 @@ impl DeformableBody {
     pub(crate) fn distribute_materials(&mut self) {
         let model = self.model.clone();
         self.materials = model.regions().map(|region| *self.region_material(region)).collect();
+        self.distribute_activations();
         self.masses = model.weigh_nodes(&self.materials, |material| material.density);
         self.node_surfaces.clear();
         let surface = |material: &DeformableMaterial| [material.friction, material.restitution];
@@ -116,17 +117,6 @@ impl DeformableBody {
             Acceleration::None => {}
         }
         self.settings = settings;
-    }
-
-    /// Stretch that muscle fibres want to have [–]: one at rest, less when they contract.
-    pub fn activation(&self) -> f64 {
-        self.activation
-    }
-
-    /// Sets the stretch that muscle fibres want to have; brought into 0 to 10, one if it is NaN.
-    pub fn set_activation(&mut self, stretch: f64) {
-        self.wake_up();
-        self.activation = if stretch.is_nan() { 1.0 } else { stretch.clamp(0.0, 10.0) };
     }
 
     /// Factor on gravity.

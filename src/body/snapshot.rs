@@ -68,6 +68,9 @@ struct BodyRecord {
     report: StepReport,
     settings: SolverSettings,
     activation: f64,
+    region_activations: Vec<(u32, f64)>,
+    #[serde(skip)]
+    activations: Vec<f64>,
     fillings: Vec<Option<CavityFilling>>,
     gravity_scale: f64,
     enabled: bool,
@@ -286,7 +289,7 @@ impl DeformableBody {
         if !fits || self.fillings.iter().flatten().any(|filling| filling.fault().is_some()) {
             return Err("what fills its cavities does not fit them".to_string());
         }
-        let scales = (0.0..=10.0).contains(&self.activation) && self.gravity_scale.is_finite();
+        let scales = self.are_activations() && self.gravity_scale.is_finite();
         if !(drives && blows && scales && !self.time_until_sleep.is_nan()) {
             return Err("a number of it is out of range".to_string());
         }

@@ -22,6 +22,8 @@ pub enum Actuator {
     CableLength(DeformableCableHandle),
     /// Stretch that the muscle fibres of a body want to have [–].
     Activation(DeformableBodyHandle),
+    /// The same of a region alone.
+    RegionActivation(DeformableBodyHandle, u32),
     /// Position that the motor of an impulse joint drives an axis to [m, rad].
     JointPosition(ImpulseJointHandle, JointMotorAxis),
     /// Velocity that the motor of an impulse joint drives an axis with [m/s, rad/s].
@@ -233,6 +235,9 @@ impl Actuator {
             Self::Activation(body) => {
                 bodies.get_mut(body)?.set_activation(value);
                 Some(())
+            }
+            Self::RegionActivation(body, region) => {
+                bodies.get_mut(body)?.set_region_activation(region, value).ok()
             }
             Self::JointPosition(joint, axis) => {
                 axis.lead(&mut parts.impulse_joints.get_mut(joint, true)?.data, value);

@@ -70,7 +70,7 @@ fn add_thin_bounds(
     stiffening: impl Fn(&DeformableMaterial) -> f64,
     mut add: impl FnMut(usize, usize, f64),
 ) {
-    let Elements { model, materials, activation } = elements;
+    let Elements { model, materials, activations } = elements;
     for triangle in &model.triangles {
         let material = &materials[triangle.region as usize];
         let stiffening = stiffening(material);
@@ -88,7 +88,7 @@ fn add_thin_bounds(
     for stencil in &model.stencils {
         let stiffening = stencil.regions.map(|region| stiffening(&materials[region as usize]));
         let stiffening = 0.5 * (stiffening[0] + stiffening[1]);
-        let weight = length_energy(stencil, materials, *activation).weight * stiffening;
+        let weight = length_energy(stencil, materials, activations).weight * stiffening;
         for (i, a) in stencil.terms() {
             for (j, b) in stencil.terms() {
                 add(i, j, weight * a * b);

@@ -42,7 +42,7 @@ fn modulus_of(kind: StencilKind, material: &DeformableMaterial) -> f64 {
 pub(super) fn length_energy(
     stencil: &Stencil,
     materials: &[DeformableMaterial],
-    activation: f64,
+    activations: &[f64],
 ) -> LengthEnergy {
     let weight = stencil.weight * modulus(stencil, materials);
     let material = &materials[stencil.regions[0] as usize];
@@ -51,7 +51,8 @@ pub(super) fn length_energy(
         .strain_limits
         .filter(|_| is_stretch)
         .map(|limits| (limits.map(|l| l * stencil.length), stencil.weight * material.limit_weight()));
-    let length = if stencil.kind == StencilKind::Fibre { activation } else { stencil.length };
+    let activation = || activations.get(stencil.regions[0] as usize).copied().unwrap_or(1.0);
+    let length = if stencil.kind == StencilKind::Fibre { activation() } else { stencil.length };
     LengthEnergy { length, weight, limits }
 }
 
@@ -63,14 +64,14 @@ pub(super) fn add_forces(
     x: &[Vec3],
     force: &mut [Vec3],
 ) -> f64 {
-    let Elements { model, materials, activation } = elements;
+    let Elements { model, materials, activations } = elements;
     let mut energy = 0.0;
     for (k, (region, material)) in model.regions.iter().zip(*materials).enumerate() {
         let ratio = ratios.get(k).copied().unwrap_or(0.0);
         energy += add_triangles(region, elements, material, (damping, ratio), x, force);
     }
     for (k, stencil) in model.stencils.iter().enumerate() {
-        let length_energy = length_energy(stencil, materials, *activation);
+        let length_energy = length_energy(stencil, materials, activations);
         let b = stencil.vector(x);
         let (mut own, mut pull) = length_energy.response(&b);
         if let Some(&length) = damping.lengths.get(k) {

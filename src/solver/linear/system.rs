@@ -141,7 +141,7 @@ pub(crate) fn assemble(
     symbolic: &Symbolic,
 ) -> Vec<f64> {
     let mut matrix = Upper::new(model, materials, pins, system, h, symbolic);
-    let elements = Elements { model, materials, activation: 1.0 };
+    let elements = Elements { model, materials, activations: &[] };
     let stiffening = |material: &DeformableMaterial| material.stiffening(h);
     add_blocks(&elements, system, stiffening, |i, j, block| matrix.add_elastic(i, j, block));
     matrix.values
