@@ -112,7 +112,7 @@ pub use error::{ActuatorError, BodyError, DeformableBodyError, HandleError};
 #[cfg(feature = "export")]
 pub use export::VtkSeries;
 pub use fem::{DeformableCavity, DeformableModel, SystemMatrix};
-pub use material::{DeformableMaterial, MaterialError, MaxwellBranch};
+pub use material::{DeformableMaterial, MaterialError, MaxwellBranch, OrthotropicSheet};
 pub use mesh::{
     MeshError, Structure, SurfaceFault, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, TetMesh,
 };
@@ -141,9 +141,9 @@ pub mod prelude {
         DeformableParameters, DeformablePipeline, DeformableRest, DeformableSkin, DeformableSolverContact,
         DeformableStress, DeformableSurfaceMesh, DeformableSurfacePoint, DeformableTape, DeformableWind,
         DeformableWorld, DepthCamera, Elasticity, FactorPrecision, Fidelity, Frames, Integrator, JointForce,
-        JointMotorAxis, JointRole, MaterialGradient, MaxwellBranch, PhysicsParts, RigidContact, SolvedJoint,
-        Solver, SolverSettings, StepGradient, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix,
-        TactilePad, TactileReading, TetMesh,
+        JointMotorAxis, JointRole, MaterialGradient, MaxwellBranch, OrthotropicSheet, PhysicsParts,
+        RigidContact, SolvedJoint, Solver, SolverSettings, StepGradient, Structure, SurfaceMesh,
+        SurfaceRepair, SystemMatrix, TactilePad, TactileReading, TetMesh,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

@@ -93,3 +93,51 @@ fn beyond_its_limits_the_material_is_stiffer() {
         }
     }
 }
+
+/// Two regions with fibres at right angles, of other stiffness and activation: each shortens along its own as a bar of its kind alone.
+#[test]
+fn regions_contract_each_along_its_own_fibres() {
+    let halves = |[x, ..]: [f64; 3]| u32::from(x > 0.0);
+    let material = DeformableMaterial::new(1e5, 0.3).mass_damping(10.0);
+    let kinds = [
+        ([1.0, 0.0, 0.0], material.fibre_modulus(3e5), 0.8),
+        ([0.0, 1.0, 0.0], material.fibre_modulus(1e5), 0.7),
+    ];
+    let rest = |kind: Option<usize>| {
+        let bar = DeformableBodyBuilder::cuboid(Vector::new(0.5, 0.05, 0.05), [20, 2, 2]).regions(halves);
+        let of = |x: [f64; 3]| kind.unwrap_or(halves(x) as usize);
+        let bar = bar.fibres(|x| kinds[of(x)].0).fidelity(Fidelity::Engineering);
+        let side = |x: f64| kinds[of([x, 0.0, 0.0])];
+        let bar = bar.region_material(0, side(-1.0).1).region_material(1, side(1.0).1);
+        let mut world = DeformableWorld::new();
+        let handle = world.insert(bar.can_sleep(false)).unwrap();
+        let body = &mut world.bodies[handle];
+        // The body's is that of what has none of its own.
+        body.set_activation(side(-1.0).2).unwrap();
+        body.set_region_activation(1, side(1.0).2).unwrap();
+        assert_eq!([body.activation(), body.region_activation(0)], [side(-1.0).2; 2]);
+        assert_eq!(body.region_activation(1), side(1.0).2);
+        assert!(body.set_region_activation(7, 0.5).is_err());
+        let mut physics = quiet();
+        (0..150).for_each(|_| world.step(&mut physics));
+        world.bodies[handle].clone()
+    };
+    // Between sections two widths from where the halves meet, and the height of the ends.
+    let shape = |body: &DeformableBody, side: f64| {
+        let at = |x: f64| mean_position(body, &at_rest_where(body, |p| (p[0] - side * x).abs() < 1e-6))[0];
+        let rim = |up: f64| {
+            let rim = at_rest_where(body, |p| up * p[1] > 0.0499 && (0.3..0.45).contains(&(side * p[0])));
+            mean_position(body, &rim)[1]
+        };
+        [(at(0.5) - at(0.2)).abs() / 0.3, (rim(1.0) - rim(-1.0)) / 0.1]
+    };
+    let both = rest(None);
+    for (k, side) in [-1.0, 1.0].into_iter().enumerate() {
+        let ([length, height], [l, h]) = (shape(&both, side), shape(&rest(Some(k)), side));
+        println!("half {k}: {length:.5} long and {height:.5} high; alone {l:.5} and {h:.5}");
+        assert!((length - l).abs() < 2e-3 && (height - h).abs() < 2e-3, "{k}: {length} {l} {height} {h}");
+        // And not as the other: what is along its fibres is the shorter.
+        let along = [length, height][k];
+        assert!(along < 0.95 && [height, length][k] > 1.0, "{length} {height}");
+    }
+}

@@ -43,9 +43,12 @@ fn every_kind_of_signal_leads_what_it_drives() {
     add("air", Actuator::CavityPressure(chamber, 0), [0.0, 1000.0], 2000.0, 0.0);
     add("pull", Actuator::CableTension(cable), [0.0, 5.0], f64::INFINITY, 0.0);
     add("muscle", Actuator::Activation(muscle), [0.5, 1.0], 0.1, 1.0);
+    add("own", Actuator::RegionActivation(muscle, 0), [0.5, 1.0], 0.2, 1.0);
     add("hinge", Actuator::JointPosition(hinge, axis), [-1.0, 1.0], 1.0, 0.0);
     add("link", Actuator::LinkPosition(link, axis), [-1.0, 1.0], 1.0, 0.0);
-    for (name, value) in [("air", 800.0), ("pull", 2.0), ("muscle", 0.0), ("hinge", 9.0), ("link", -0.5)] {
+    for (name, value) in
+        [("air", 800.0), ("pull", 2.0), ("muscle", 0.0), ("own", 0.0), ("hinge", 9.0), ("link", -0.5)]
+    {
         deformables.actuators.command(name, value).unwrap();
     }
     for step in 1..=15 {
@@ -57,6 +60,7 @@ fn every_kind_of_signal_leads_what_it_drives() {
         assert_eq!(value("pull"), 2.0);
         assert!((deformables.bodies.cable(cable).unwrap().tension() - 2.0).abs() < 1e-9);
         assert!((deformables.bodies[muscle].activation() - (1.0 - 0.1 * t).max(0.5)).abs() < 1e-12);
+        assert!((deformables.bodies[muscle].region_activation(0) - (1.0 - 0.2 * t).max(0.5)).abs() < 1e-12);
     }
     (0..240).for_each(|_| deformables.step(&mut physics));
     let angle = |body: RigidBodyHandle| physics.bodies[body].rotation().to_scaled_axis().z;

@@ -75,3 +75,45 @@ fn cables_and_signals_that_cannot_be_are_refused_by_name() {
     let run = foible_cli::run::run(&common::scene(&text), &Default::default());
     assert!(run.outcome.error.unwrap().contains("signal \"air\""));
 }
+
+/// Two strips pulled along x by their weight: along the warp, and by region along the weft.
+#[test]
+fn woven_sheets_stretch_by_the_modulus_of_their_direction() {
+    let held = "pinned = { min = [-1, -1, -9], max = [-0.499, 1, 9] }";
+    let strip = |name: &str, z: f64, rest: &str| {
+        format!(
+            r#"{{ name = "{name}", body = {{ cloth = {{ half_extents = [0.5, 0.1], cells = [20, 4], thickness = 0.01 }} }}, {held}, translation = [0, 0, {z}], {rest} }}"#
+        )
+    };
+    let sheet = "sheet = { warp_modulus = 1e7, weft_modulus = 1e6, poisson_ratio = 0, shear_modulus = 4e5 }";
+    let material =
+        format!("{{ youngs_modulus = 1e6, poisson_ratio = 0, density = 1000, mass_damping = 20, {sheet} }}");
+    let regions = format!(
+        "regions = [{{ box = {{ min = [-9, -9, -9], max = [9, 9, 9] }}, warp = [0, 0, 1], material = {material} }}]"
+    );
+    let strips = [
+        strip("warp", 0.0, &format!("warp = [1, 0, 0], material = {material}")),
+        strip("weft", 1.0, &format!("warp = [1, 0, 0], material = {material}, {regions}")),
+    ];
+    let text = format!(
+        r#"
+        world = {{ duration = 3.0, dt = 0.01, gravity = [9.81, 0, 0] }}
+        deformable = [{}]
+        measure = [{{ name = "warp", quantity = "x", of = "warp" }}, {{ name = "weft", quantity = "x", of = "weft" }}]
+        "#,
+        strips.join(", ")
+    );
+    let run = outcome(&text);
+    for (name, modulus) in [("warp", 1e7), ("weft", 1e6)] {
+        // ρ g L²/(3E), of the centre of mass.
+        let expected = 1000.0 * 9.81 / (3.0 * modulus);
+        let found = number(&run, name);
+        assert!((found / expected - 1.0).abs() < 0.02, "{name}: {found} {expected}");
+    }
+    let bad = text.replace("poisson_ratio = 0, shear", "poisson_ratio = 4, shear");
+    let said = foible_cli::scene::parse(&bad).map(|_| ()).unwrap_err().to_string();
+    assert!(said.contains("is 4,") && said.contains("which is 3.16"), "{said}");
+    let bad = text.replace("warp = [1, 0, 0],", "");
+    let run = foible_cli::run::run(&common::scene(&bad), &Default::default());
+    assert!(run.outcome.error.unwrap().contains("without a direction of the warp"));
+}

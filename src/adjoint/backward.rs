@@ -86,7 +86,7 @@ impl<'a> Backward<'a> {
             of_fixed[node as usize] = std::mem::take(&mut g[node as usize]);
         }
         let elements =
-            Elements { model: self.model, materials: &record.materials, activation: record.activation };
+            Elements { model: self.model, materials: &record.materials, activations: &record.activations };
         if !self.tangent.update(&elements, &record.x_end, &fixed, record.h) {
             return Err("its stiffness has no inverse");
         }

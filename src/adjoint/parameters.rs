@@ -30,10 +30,10 @@ pub(super) struct ElasticWork<'a> {
 }
 
 impl ElasticWork<'_> {
-    fn of(&mut self, materials: &[DeformableMaterial], activation: f64) -> f64 {
+    fn of(&mut self, materials: &[DeformableMaterial], activations: &[f64]) -> f64 {
         self.force.clear();
         self.force.resize(self.z.len(), Vec3::zeros());
-        let elements = Elements { model: self.model, materials, activation };
+        let elements = Elements { model: self.model, materials, activations };
         let (damping, frame) = (StiffnessDamping::default(), Mat3::identity());
         let x = &self.record.x_end;
         let at = Evaluation { damping: &damping, x, frame: &frame, limit: f64::INFINITY };
@@ -54,7 +54,7 @@ impl ElasticWork<'_> {
         for (place, weight) in scheme {
             materials[region] = self.record.materials[region];
             set(&mut materials[region], place * by);
-            sum += weight * self.of(&materials, self.record.activation);
+            sum += weight * self.of(&materials, &self.record.activations);
         }
         sum / by
     }
@@ -71,7 +71,7 @@ impl ElasticWork<'_> {
             let DeformableMaterial { youngs_modulus, poisson_ratio, .. } = self.record.materials[region];
             let by = DIFFERENCE * youngs_modulus;
             out.youngs_modulus += if moduli.is_empty() {
-                self.of(&self.record.materials, self.record.activation) / youngs_modulus
+                self.of(&self.record.materials, &self.record.activations) / youngs_modulus
             } else {
                 self.along(region, by, moduli, |m, d| m.youngs_modulus += d)
             };
@@ -85,14 +85,15 @@ impl ElasticWork<'_> {
         }
     }
 
-    /// With respect to the activation.
+    /// With respect to the activation, of all regions alike.
     pub fn activation(&mut self) -> f64 {
         if !self.model.has_fibres() {
             return 0.0;
         }
         let (record, mut sum) = (self.record, 0.0);
         for (place, weight) in LINEAR {
-            sum += weight * self.of(&record.materials, record.activation + place * DIFFERENCE);
+            let activations = record.activations.iter().map(|stretch| stretch + place * DIFFERENCE);
+            sum += weight * self.of(&record.materials, &activations.collect::<Vec<_>>());
         }
         sum / DIFFERENCE
     }

@@ -28,7 +28,7 @@ pub(super) struct StepRecord {
     pub v_start: Vec<Vec3>,
     pub x_end: Vec<Vec3>,
     pub materials: Vec<DeformableMaterial>,
-    pub activation: f64,
+    pub activations: Vec<f64>,
     /// Of the world [m/s²], and the body's factor on it.
     pub gravity: Vec3,
     pub gravity_scale: f64,
@@ -83,7 +83,7 @@ impl StepRecord {
             v_start: problem.v_start.clone(),
             x_end: body.state.x.clone(),
             materials: body.materials.clone(),
-            activation: body.activation,
+            activations: body.activations.clone(),
             gravity,
             gravity_scale: body.gravity_scale(),
             forces: body.forces.clone(),
@@ -100,6 +100,7 @@ fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
         (body.body_type() != RigidBodyType::Dynamic, "the body is not dynamic"),
         (body.settings().integrator != Integrator::ImplicitEuler, "only implicit Euler has one"),
         (body.materials.iter().any(resists), "stiffness damping and Maxwell branches have none"),
+        (body.materials.iter().any(|m| m.orthotropic.is_some()), "woven sheets have none"),
         (body.fillings.iter().any(Option::is_some), "filled cavities have none"),
         (body.wind().is_some(), "wind has none"),
     ];

@@ -158,7 +158,7 @@ mod tests {
     fn an_indefinite_hessian_is_solved_with_too() {
         let model = DeformableModel::new(&TetMesh::cuboid([0.3, 0.1, 0.1], [6, 2, 2]).unwrap());
         let material = DeformableMaterial::new(1e5, 0.3).elasticity(Elasticity::NeoHookean);
-        let elements = Elements { model: &model, materials: &[material], activation: 1.0 };
+        let elements = Elements { model: &model, materials: &[material], activations: &[] };
         let pins: Vec<u32> =
             (0..model.rest.len() as u32).filter(|n| model.rest[*n as usize].x < -0.29).collect();
         for (squeeze, is_definite) in [(1.0, true), (0.6, false)] {

@@ -83,7 +83,10 @@ pub struct DeformableBody {
     pub(crate) forces: Vec<Vec3>,
     pub(crate) report: StepReport,
     pub(super) settings: SolverSettings,
-    pub(crate) activation: f64,
+    /// Stretch that muscle fibres want to have: where regions have none of their own, of regions that have, and of each.
+    pub(super) activation: f64,
+    pub(super) region_activations: Vec<(u32, f64)>,
+    pub(crate) activations: Vec<f64>,
     /// Of the model's cavities; empty while nothing was filled.
     pub(crate) fillings: Vec<Option<CavityFilling>>,
     pub(super) gravity_scale: f64,
@@ -134,6 +137,8 @@ impl DeformableBody {
             report: StepReport::default(),
             settings: SolverSettings::default(),
             activation: 1.0,
+            region_activations: Vec::new(),
+            activations: Vec::new(),
             fillings: Vec::new(),
             gravity_scale: 1.0,
             enabled: true,
@@ -255,7 +260,7 @@ impl DeformableBody {
     // ── For the other rooms of the crate ────────────────────────────────
 
     pub(crate) fn elements(&self) -> Elements<'_> {
-        Elements { model: &self.model, materials: &self.materials, activation: self.activation }
+        Elements { model: &self.model, materials: &self.materials, activations: &self.activations }
     }
 
     pub(crate) fn node_mass(&self, node: usize) -> f64 {

@@ -199,6 +199,22 @@ impl DeformableBodyBuilder {
         self
     }
 
+    /// Adds muscle fibres to the tetrahedra, along what `direction` says of the place of their middle \[m\] in the rest shape: see
+    /// [`DeformableModel::with_fibres`]. Their stiffness is the material's, by region; what they want
+    /// [`DeformableBody::set_activation`] and [`DeformableBody::set_region_activation`] say.
+    pub fn fibres(mut self, direction: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
+        self.model = self.model.map(|model| Arc::new((*model).clone().with_fibres(direction)));
+        self
+    }
+
+    /// Sets the direction of the warp in woven sheets: what `direction` says of the place of a triangle's middle \[m\] in the rest shape,
+    /// projected on the triangle. See [`DeformableMaterial::orthotropic_sheet`]. A direction that is normal to its triangle is an
+    /// error of [`DeformableBodyBuilder::build`].
+    pub fn warp(mut self, direction: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
+        self.model = self.model.and_then(|model| model.with_warp(direction).map(Arc::new));
+        self
+    }
+
     /// Gives a region a material of its own; all others have that of [`DeformableBodyBuilder::material`].
     pub fn region_material(mut self, region: u32, material: DeformableMaterial) -> Self {
         self.region_materials.push((region, material));
@@ -352,6 +368,9 @@ impl DeformableBodyBuilder {
         for (region, material) in &self.region_materials {
             body.set_region_material(*region, *material)?;
         }
+        body.model()
+            .regions()
+            .try_for_each(|region| body.check_warp(body.region_material(region), region))?;
         for (cavity, filling) in &self.fillings {
             body.fill_cavity(*cavity, Some(*filling))?;
         }

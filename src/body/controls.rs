@@ -26,9 +26,22 @@ impl DeformableBody {
     pub fn set_material(&mut self, material: DeformableMaterial) -> Result<(), MaterialError> {
         self.wake_up();
         material.validate()?;
+        let has_own = |region: &u32| self.region_materials.iter().any(|(tag, _)| tag == region);
+        let others = self.model.regions().filter(|region| !has_own(region));
+        others.into_iter().try_for_each(|region| self.check_warp(&material, region))?;
         self.material = material;
         self.distribute_materials();
         Ok(())
+    }
+
+    /// Whether a region may have a material: woven cloth needs the direction of its warp.
+    pub(super) fn check_warp(&self, material: &DeformableMaterial, region: u32) -> Result<(), MaterialError> {
+        let without = self.model.triangles_without_warp(region);
+        if material.orthotropic.is_none() || without == 0 {
+            return Ok(());
+        }
+        let range = "0: a woven sheet has one, by DeformableBodyBuilder::warp";
+        Err(MaterialError::new("number of triangles without a direction of the warp", without as f64, range))
     }
 
     /// The material of a region: its own, or the body's.
@@ -52,6 +65,7 @@ impl DeformableBody {
         if self.model.region(region).is_none() {
             return Err(BodyError::NoSuchRegion { region, regions: self.model.regions().len() }.into());
         }
+        self.check_warp(&material, region)?;
         self.wake_up();
         match self.region_materials.binary_search_by_key(&region, |(tag, _)| *tag) {
             Ok(place) => self.region_materials[place].1 = material,
@@ -65,6 +79,7 @@ impl DeformableBody {
     pub(crate) fn distribute_materials(&mut self) {
         let model = self.model.clone();
         self.materials = model.regions().map(|region| *self.region_material(region)).collect();
+        self.distribute_activations();
         self.masses = model.weigh_nodes(&self.materials, |material| material.density);
         self.node_surfaces.clear();
         let surface = |material: &DeformableMaterial| [material.friction, material.restitution];
@@ -102,22 +117,6 @@ impl DeformableBody {
             Acceleration::None => {}
         }
         self.settings = settings;
-    }
-
-    /// Stretch that muscle fibres want to have [–]: one at rest, less when they contract.
-    pub fn activation(&self) -> f64 {
-        self.activation
-    }
-
-    /// Sets the stretch that muscle fibres want to have, from 0 to 10.
-    ///
-    /// # Errors
-    /// [`BodyError::OutOfRange`]; nothing is changed then.
-    pub fn set_activation(&mut self, stretch: f64) -> Result<(), BodyError> {
-        in_range("activation", stretch, "from 0 to 10", (0.0..=10.0).contains(&stretch))?;
-        self.wake_up();
-        self.activation = stretch;
-        Ok(())
     }
 
     /// Factor on gravity.

@@ -23,6 +23,7 @@ mod cavities;
 mod controls;
 mod forces;
 mod motion;
+mod muscles;
 mod pins;
 mod report;
 mod sleep;

@@ -25,7 +25,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 /// Of what is written. Another one is refused: numbers of another layout would be read as something else.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// Comes first, so that nothing of another version is read.
 #[derive(Serialize)]
@@ -68,6 +68,9 @@ struct BodyRecord {
     report: StepReport,
     settings: SolverSettings,
     activation: f64,
+    region_activations: Vec<(u32, f64)>,
+    #[serde(skip)]
+    activations: Vec<f64>,
     fillings: Vec<Option<CavityFilling>>,
     gravity_scale: f64,
     enabled: bool,
@@ -260,6 +263,9 @@ impl DeformableBody {
         if !(regions.is_sorted_by(|a, b| a.0 < b.0) && regions.iter().all(known)) {
             return Err("its regions are not those of its model".to_string());
         }
+        for region in self.model.regions() {
+            self.check_warp(self.region_material(region), region).map_err(|error| error.to_string())?;
+        }
         self.distribute_materials();
         self.state.check(&self.model).map_err(str::to_string)?;
         let are_pins = |pins: &[Pin]| {
@@ -283,7 +289,7 @@ impl DeformableBody {
         if !fits || self.fillings.iter().flatten().any(|filling| filling.fault().is_some()) {
             return Err("what fills its cavities does not fit them".to_string());
         }
-        let scales = (0.0..=10.0).contains(&self.activation) && self.gravity_scale.is_finite();
+        let scales = self.are_activations() && self.gravity_scale.is_finite();
         if !(drives && blows && scales && !self.time_until_sleep.is_nan()) {
             return Err("a number of it is out of range".to_string());
         }

@@ -22,6 +22,8 @@ pub enum Actuator {
     CableLength(DeformableCableHandle),
     /// Stretch that the muscle fibres of a body want to have [–].
     Activation(DeformableBodyHandle),
+    /// The same of a region alone.
+    RegionActivation(DeformableBodyHandle, u32),
     /// Position that the motor of an impulse joint drives an axis to [m, rad].
     JointPosition(ImpulseJointHandle, JointMotorAxis),
     /// Velocity that the motor of an impulse joint drives an axis with [m/s, rad/s].
@@ -162,7 +164,7 @@ impl DeformableActuators {
             return Err(bad("start, which is outside of the range,", start));
         }
         let beyond = range.into_iter().find(|value| !(0.0..=10.0).contains(value));
-        if let (Actuator::Activation(_), Some(value)) = (actuator, beyond) {
+        if let (Actuator::Activation(_) | Actuator::RegionActivation(..), Some(value)) = (actuator, beyond) {
             return Err(bad("range, which for an activation is within 0 and 10,", value));
         }
         if self.signals.contains_key(name) {
@@ -235,6 +237,9 @@ impl Actuator {
             Self::CableTension(cable) => bodies.cable_mut(cable)?.set_tension(value).ok(),
             Self::CableLength(cable) => bodies.cable_mut(cable)?.set_length(value).ok(),
             Self::Activation(body) => bodies.get_mut(body)?.set_activation(value).ok(),
+            Self::RegionActivation(body, region) => {
+                bodies.get_mut(body)?.set_region_activation(region, value).ok()
+            }
             Self::JointPosition(joint, axis) => {
                 axis.lead(&mut parts.impulse_joints.get_mut(joint, true)?.data, value);
                 Some(())

@@ -1,10 +1,13 @@
 //! Triangles that stretch: corotated elasticity in plane stress, `Ψ = μ‖F − R‖² + λ̄/2·tr²(RᵀF − I)` with
 //! the 3×2 deformation gradient F, its polar factor R and λ̄ = 2μλ/(λ + 2μ), so that a sheet under
-//! tension is thinned by Poisson's ratio as the solid it is cut from.
+//! tension is thinned by Poisson's ratio as the solid it is cut from. Woven ones have a stiffness of their own
+//! ([`super::orthotropic`]).
 
 use super::Lame;
+use super::orthotropic::PlaneStress;
 use super::strain_limit::excess;
 use crate::math::{Mat2, Mat3x2, Vec3};
+use nalgebra::Matrix4;
 
 /// The energy of a sheet's triangles.
 #[derive(Clone, Copy, Debug)]
@@ -13,6 +16,8 @@ pub(crate) struct Membrane {
     lambda: f64,
     limits: Option<[f64; 2]>,
     limit_weight: f64,
+    /// In the place of μ and λ̄, with F in the axes of warp and weft.
+    woven: Option<PlaneStress>,
 }
 
 /// What a triangle answers to its deformation.
@@ -37,7 +42,12 @@ const COLLAPSED: f64 = 1.0e-9;
 impl Membrane {
     /// Of a solid's Lamé parameters, with its limits of strain and the weight \[Pa\] of what is beyond them.
     pub fn new(Lame { mu, lambda }: Lame, limits: Option<[f64; 2]>, limit_weight: f64) -> Self {
-        Self { mu, lambda: 2.0 * mu * lambda / (lambda + 2.0 * mu), limits, limit_weight }
+        Self { mu, lambda: 2.0 * mu * lambda / (lambda + 2.0 * mu), limits, limit_weight, woven: None }
+    }
+
+    /// Of woven cloth.
+    pub fn woven(stiffness: PlaneStress, limits: Option<[f64; 2]>, limit_weight: f64) -> Self {
+        Self { mu: 0.0, lambda: 0.0, limits, limit_weight, woven: Some(stiffness) }
     }
 
     pub fn evaluate(&self, F: &Mat3x2) -> MembraneResponse {
@@ -48,6 +58,9 @@ impl Membrane {
             density: self.mu * deviation.norm_squared() + 0.5 * self.lambda * trace * trace,
             stress: deviation * (2.0 * self.mu) + rotation * (self.lambda * trace),
         };
+        if let Some(woven) = &self.woven {
+            (response.density, response.stress) = woven.evaluate(F, &rotation, &Mat2::identity());
+        }
         if let Some(limits) = self.limits {
             let room = (1.0 - limits[0]).min(limits[1] - 1.0);
             if deviation.norm_squared() > room * room {
@@ -65,6 +78,9 @@ impl Membrane {
     /// Density [J/m³] and stress \[Pa\] of the change from a stretch S, turned as the triangle is now: what damping and Maxwell
     /// branches have, per factor on the stiffness.
     pub fn change_response(&self, F: &Mat3x2, S: &Mat2) -> (f64, Mat3x2) {
+        if let Some(woven) = &self.woven {
+            return woven.evaluate(F, &polar_factor(F), S);
+        }
         let deviation = F - polar_factor(&(F * S)) * S;
         let rotation = polar_factor(F);
         let trace = rotation.dot(F) - S.trace();
@@ -75,6 +91,9 @@ impl Membrane {
     /// The Hessian over F: two modes that stretch, a shear and a turn in the plane, and two that tilt the
     /// triangle out of it.
     pub fn modes(&self, F: &Mat3x2) -> [MembraneMode; 6] {
+        if let Some(woven) = &self.woven {
+            return self.woven_modes(woven, F);
+        }
         let (U, s, V) = principal_axes(F);
         let trace = s[0] + s[1] - 2.0;
         let mut slope = s.map(|s| 2.0 * self.mu * (s - 1.0) + self.lambda * trace);
@@ -115,9 +134,55 @@ impl Membrane {
         ]
     }
 
-    /// As of the tetrahedra's energies.
-    pub fn laplacian_weight(&self) -> f64 {
-        2.0 * self.mu + 0.5 * self.lambda
+    /// The same of woven cloth, whose stress has other axes than its stretch: those in the plane by the eigenvectors of all four.
+    fn woven_modes(&self, woven: &PlaneStress, F: &Mat3x2) -> [MembraneMode; 6] {
+        let (U, s, V) = principal_axes(F);
+        let (mut plane, T) = woven.hessian(s, &V);
+        let size = s[0].max(s[1]).max(COLLAPSED);
+        // 2 X of the module's description.
+        let mut tilts = Mat2::from_fn(|i, j| 2.0 * T[(i, j)] / (s[i] + s[j]).max(COLLAPSED * size));
+        if let Some(limits) = self.limits {
+            let beyond = s.map(|s| self.limit_weight * excess(s, limits));
+            self.add_limits(beyond, s, &mut plane);
+            (0..2).for_each(|k| tilts[(k, k)] += beyond[k] / s[k].max(COLLAPSED * size));
+        }
+        let normal = U[0].cross(&U[1]);
+        let (plane, tilts) = (plane.symmetric_eigen(), tilts.symmetric_eigen());
+        std::array::from_fn(|k| match k.checked_sub(4) {
+            None => {
+                let q = plane.eigenvectors.column(k);
+                let in_plane = U[0] * (V.column(0) * q[0] + V.column(1) * q[2]).transpose();
+                let shape = in_plane + U[1] * (V.column(0) * q[1] + V.column(1) * q[3]).transpose();
+                MembraneMode { stiffness: plane.eigenvalues[k], shape }
+            }
+            Some(k) => MembraneMode {
+                stiffness: tilts.eigenvalues[k],
+                shape: normal * (V * tilts.eigenvectors.column(k)).transpose(),
+            },
+        })
+    }
+
+    /// Adds the Hessian in the plane of what is beyond the limits, with these slopes, to one over the entries 00, 10, 01, 11.
+    fn add_limits(&self, slope: [f64; 2], s: [f64; 2], plane: &mut Matrix4<f64>) {
+        let curvature = slope.map(|slope| if slope == 0.0 { 0.0 } else { self.limit_weight });
+        let size = s[0].max(s[1]).max(COLLAPSED);
+        let difference = s[0] - s[1];
+        let shear = if difference.abs() > 1e-7 * size {
+            (slope[0] - slope[1]) / difference
+        } else {
+            0.5 * (curvature[0] + curvature[1])
+        };
+        let turn = (slope[0] + slope[1]) / (s[0] + s[1]).max(COLLAPSED * size);
+        plane[(0, 0)] += curvature[0];
+        plane[(3, 3)] += curvature[1];
+        for (i, j) in [(1, 1), (1, 2), (2, 1), (2, 2)] {
+            plane[(i, j)] += 0.5 * (shear + if i == j { turn } else { -turn });
+        }
+    }
+
+    /// As of the tetrahedra's energies, along the first and the second axis of F.
+    pub fn laplacian_weights(&self) -> [f64; 2] {
+        self.woven.as_ref().map_or([2.0 * self.mu + 0.5 * self.lambda; 2], PlaneStress::weights)
     }
 }
 
@@ -164,8 +229,15 @@ mod tests {
         Membrane::new(lame, limits, 20.0 * e)
     }
 
-    fn sheets() -> [Membrane; 2] {
-        [sheet(1.0, 0.4, None), sheet(1.0, 0.4, Some([0.9, 1.1]))]
+    /// Of cloth of E 1 and 0.2, ν₁₂ 0.5 and G 0.1.
+    fn cloth(limits: Option<[f64; 2]>) -> Membrane {
+        let along = [1.0, 0.2].map(|e: f64| e / (1.0 - 0.25 * 0.2));
+        Membrane::woven(PlaneStress { along, coupling: 0.5 * along[1], shear: 0.1 }, limits, 20.0)
+    }
+
+    fn sheets() -> [Membrane; 4] {
+        let limits = Some([0.9, 1.1]);
+        [sheet(1.0, 0.4, None), sheet(1.0, 0.4, limits), cloth(None), cloth(limits)]
     }
 
     fn matrix(size: f64) -> impl Strategy<Value = Mat3x2> {
@@ -207,6 +279,48 @@ mod tests {
                 prop_assert!(modes.iter().all(|m| m.stiffness.is_finite()));
             }
         }
+    }
+
+    #[test]
+    fn cloth_of_one_modulus_is_the_isotropic_sheet() {
+        let (e, nu) = (1.0, 0.4);
+        let c = e / (1.0 - nu * nu);
+        let shear = e / (2.0 * (1.0 + nu));
+        for limits in [None, Some([0.9, 1.1])] {
+            let cloth =
+                Membrane::woven(PlaneStress { along: [c; 2], coupling: nu * c, shear }, limits, 20.0 * e);
+            let sheet = sheet(e, nu, limits);
+            let [a, b] = [&cloth, &sheet].map(|s| s.laplacian_weights());
+            assert!((a[0] - b[0]).abs() < 1e-15 && a[0] == a[1]);
+            for F in [[1.3, 0.2, 0.1, -0.3, 0.8, 0.4], [0.2, 0.0, 0.5, 1.0, 1.1, -0.4]] {
+                let F = Mat3x2::from_column_slice(&F);
+                let [own, other] = [&cloth, &sheet].map(|s| s.evaluate(&F));
+                assert!((own.density - other.density).abs() < 1e-14);
+                assert!((own.stress - other.stress).norm() < 1e-14);
+                let product = |s: &Membrane, dF: &Mat3x2| {
+                    let parts = s.modes(&F);
+                    parts
+                        .iter()
+                        .fold(Mat3x2::zeros(), |sum, m| sum + m.shape * (m.stiffness * m.shape.dot(dF)))
+                };
+                for k in 0..6 {
+                    let mut dF = Mat3x2::zeros();
+                    dF[k] = 1.0;
+                    assert!((product(&cloth, &dF) - product(&sheet, &dF)).norm() < 1e-12);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn cloth_that_is_turned_answers_turned() {
+        let turn = crate::math::rotation_from_vector(&Vec3::new(0.4, -1.1, 2.0));
+        let F = Mat3x2::from_column_slice(&[1.3, 0.2, 0.1, -0.3, 0.8, 0.4]);
+        let [here, there] = [F, turn * F].map(|F| cloth(None).evaluate(&F));
+        assert!((here.density - there.density).abs() < 1e-15);
+        assert!((turn * here.stress - there.stress).norm() < 1e-14);
+        let at_rest = cloth(None).evaluate(&(turn * Mat3x2::identity()));
+        assert!(at_rest.density < 1e-28 && at_rest.stress.norm() < 1e-13);
     }
 
     #[test]

@@ -6,6 +6,7 @@
 
 mod filling;
 pub(crate) mod membrane;
+pub(crate) mod orthotropic;
 mod principal;
 pub(crate) mod stencil;
 pub(crate) mod strain_limit;

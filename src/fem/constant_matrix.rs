@@ -11,6 +11,7 @@ use crate::energy::{ElementEnergy, Lame, with_energy};
 use crate::material::DeformableMaterial;
 use crate::math::lanes::{Lane, LaneMat3};
 use crate::math::{Mat3, Vec3, vectorized};
+use nalgebra::Vector2;
 use std::ops::Range;
 
 /// The constant matrix of the global step.
@@ -69,20 +70,25 @@ fn add_thin_bounds(
     stiffening: impl Fn(&DeformableMaterial) -> f64,
     mut add: impl FnMut(usize, usize, f64),
 ) {
-    let Elements { model, materials, activation } = elements;
+    let Elements { model, materials, activations } = elements;
     for triangle in &model.triangles {
         let material = &materials[triangle.region as usize];
-        let weight = membrane(material).laplacian_weight() * stiffening(material);
+        let stiffening = stiffening(material);
+        let [warp, weft] = membrane(material).laplacian_weights().map(|weight| weight * stiffening);
+        let product = |a: &Vector2<f64>, b: &Vector2<f64>| match warp == weft {
+            true => warp * triangle.volume * a.dot(b),
+            false => triangle.volume * (warp * a.x * b.x + weft * a.y * b.y),
+        };
         for (&i, a) in triangle.nodes.iter().zip(&triangle.gradients) {
             for (&j, b) in triangle.nodes.iter().zip(&triangle.gradients) {
-                add(i as usize, j as usize, weight * triangle.volume * a.dot(b));
+                add(i as usize, j as usize, product(a, b));
             }
         }
     }
     for stencil in &model.stencils {
         let stiffening = stencil.regions.map(|region| stiffening(&materials[region as usize]));
         let stiffening = 0.5 * (stiffening[0] + stiffening[1]);
-        let weight = length_energy(stencil, materials, *activation).weight * stiffening;
+        let weight = length_energy(stencil, materials, activations).weight * stiffening;
         for (i, a) in stencil.terms() {
             for (j, b) in stencil.terms() {
                 add(i, j, weight * a * b);

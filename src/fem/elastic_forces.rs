@@ -229,14 +229,14 @@ mod tests {
     fn forces(material: &DeformableMaterial, damping: &StiffnessDamping, x: &[Vec3]) -> (f64, Vec<Vec3>) {
         let mut f = vec![Vec3::zeros(); x.len()];
         let elements =
-            Elements { model: &model(), materials: std::slice::from_ref(material), activation: 1.0 };
+            Elements { model: &model(), materials: std::slice::from_ref(material), activations: &[] };
         let elastic = add_forces(&elements, &free(damping, x), &mut f);
         (elastic.energy, f)
     }
 
     fn begun(model: &DeformableModel, materials: &[DeformableMaterial], seed: u64) -> StiffnessDamping {
         let mut damping = StiffnessDamping::default();
-        let elements = Elements { model, materials, activation: 1.0 };
+        let elements = Elements { model, materials, activations: &[] };
         damping.begin(&elements, 0.01, &shaken(seed ^ 1, 0.05), None);
         damping
     }
@@ -278,7 +278,7 @@ mod tests {
             let model = if smoothed { halves.smoothed() } else { halves };
             let soft = DeformableMaterial::new(1e3, 0.4).elasticity(Elasticity::ALL[kind]);
             let materials = [soft.stiffness_damping(beta), soft.poisson_ratio(0.0), soft.youngs_modulus(1e2)];
-            let elements = Elements { model: &model, materials: &materials, activation: 1.0 };
+            let elements = Elements { model: &model, materials: &materials, activations: &[] };
             let damping = begun(&model, &materials, seed);
             let at = |x: &[Vec3]| {
                 let mut f = vec![Vec3::zeros(); x.len()];
@@ -341,7 +341,7 @@ mod tests {
         for elasticity in [Elasticity::LinearCorotated, Elasticity::Projective] {
             let material = DeformableMaterial::new(1.0, 0.3).elasticity(elasticity);
             let mut f = vec![Vec3::zeros(); x.len()];
-            let elements = Elements { model: &model, materials: &[material], activation: 1.0 };
+            let elements = Elements { model: &model, materials: &[material], activations: &[] };
             add_forces(&elements, &free(&StiffnessDamping::default(), &x), &mut f);
             for (X, f) in model.rest.iter().zip(&f) {
                 if X.iter().all(|c| c.abs() < 0.29) {

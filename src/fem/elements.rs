@@ -57,7 +57,10 @@ pub(crate) struct TriangleElement {
     pub nodes: [u32; 3],
     /// Place of its region.
     pub region: u32,
-    /// Gradients of the corners' shape functions in the plane of the triangle [1/m]: `F = Σ x_a g_aᵀ`.
+    /// Whether the first axis of its gradients is the warp's.
+    pub is_woven: bool,
+    /// Gradients of the corners' shape functions in the plane of the triangle [1/m]: `F = Σ x_a g_aᵀ`. The axes are those of warp
+    /// and weft; without, the first is along its first edge.
     pub gradients: [Vector2<f64>; 3],
     /// Area times thickness \[m³\].
     pub volume: f64,
@@ -73,7 +76,19 @@ impl TriangleElement {
         let (l, s) = ((b - a).norm(), along.dot(&(c - a)));
         let gb = Vector2::new(1.0 / l, -s / (l * height));
         let gc = Vector2::new(0.0, 1.0 / height);
-        Self { nodes, region: 0, gradients: [-(gb + gc), gb, gc], volume: 0.5 * l * height * thickness }
+        let gradients = [-(gb + gc), gb, gc];
+        Self { nodes, region: 0, is_woven: false, gradients, volume: 0.5 * l * height * thickness }
+    }
+
+    /// The same with the first axis along what `warp` is in its plane.
+    pub fn woven(self, warp: &Vec3, rest: &[Vec3]) -> Self {
+        let [a, b, c] = self.nodes.map(|n| rest[n as usize]);
+        let along = (b - a).normalize();
+        let across = (b - a).cross(&(c - a)).normalize().cross(&along);
+        let first = Vector2::new(warp.dot(&along), warp.dot(&across)).normalize();
+        let second = Vector2::new(-first.y, first.x);
+        let gradients = self.gradients.map(|g| Vector2::new(first.dot(&g), second.dot(&g)));
+        Self { gradients, is_woven: true, ..self }
     }
 
     pub fn deformation_gradient(&self, x: &[Vec3]) -> Mat3x2 {

@@ -64,8 +64,8 @@ pub(crate) struct Elements<'a> {
     pub model: &'a DeformableModel,
     /// One per region.
     pub materials: &'a [DeformableMaterial],
-    /// Stretch that muscle fibres want to have.
-    pub activation: f64,
+    /// Stretch that the muscle fibres of each region want to have; one where none is given.
+    pub activations: &'a [f64],
 }
 
 /// What a body is made of, as far as settings depend on it.

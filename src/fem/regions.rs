@@ -6,7 +6,7 @@ use super::model::DeformableModel;
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
 use crate::math::lanes::LANES;
-use crate::mesh::Rod;
+use crate::mesh::{MeshError, Rod, Structure};
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
@@ -113,12 +113,25 @@ impl DeformableModel {
     /// [`Structure::painted`](crate::Structure::painted).
     #[must_use]
     pub fn painted(&self, region: impl Fn([f64; 3]) -> u32) -> Self {
-        let mut painted = Self::of((*self.structure).clone().painted(region));
+        self.remade((*self.structure).clone().painted(region))
+    }
+
+    /// The same with the direction of the warp in its sheets, as [`Structure::with_warp`](crate::Structure::with_warp).
+    ///
+    /// # Errors
+    /// [`MeshError::BadWarp`].
+    pub fn with_warp(&self, direction: impl Fn([f64; 3]) -> [f64; 3]) -> Result<Self, MeshError> {
+        Ok(self.remade((*self.structure).clone().with_warp(direction)?))
+    }
+
+    /// Of a structure of the same elements, with its fibres and smoothing.
+    fn remade(&self, structure: Structure) -> Self {
+        let mut remade = Self::of(structure);
         // Nodes keep their order, tetrahedra do not.
-        let places: HashMap<[u32; 4], u32> = painted.tetrahedra.iter().copied().zip(0..).collect();
+        let places: HashMap<[u32; 4], u32> = remade.tetrahedra.iter().copied().zip(0..).collect();
         let place = |(tet, along): &(u32, Vec3)| (places[&self.tetrahedra[*tet as usize]], *along);
-        painted.add_fibres(&self.fibres.iter().map(place).collect::<Vec<_>>());
-        if self.is_smoothed() { painted.smoothed() } else { painted }
+        remade.add_fibres(&self.fibres.iter().map(place).collect::<Vec<_>>());
+        if self.is_smoothed() { remade.smoothed() } else { remade }
     }
 
     /// The regions that its elements are in, ascending.
@@ -161,6 +174,12 @@ impl DeformableModel {
             ends.zip(rod.regions.iter().copied()).collect()
         };
         self.structure.rods.iter().flat_map(segments)
+    }
+
+    /// Triangles of a region that have no direction of the warp.
+    pub(crate) fn triangles_without_warp(&self, region: u32) -> usize {
+        let Some(place) = self.region(region) else { return 0 };
+        self.triangles[self.regions[place].triangles.clone()].iter().filter(|t| !t.is_woven).count()
     }
 
     /// The place of a region among all, if an element is in it.

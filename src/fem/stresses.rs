@@ -78,7 +78,7 @@ pub(crate) fn section_forces(
     let (mut tensions, mut moments) = (Vec::new(), Vec::new());
     for stencil in &model.stencils {
         let b = stencil.vector(x);
-        let pull = length_energy(stencil, materials, 1.0).response(&b).1;
+        let pull = length_energy(stencil, materials, &[]).response(&b).1;
         match stencil.kind {
             // Over the length at rest, as energy has it: the pull is along b.
             StencilKind::Stretch => tensions.push(pull.dot(&b) / b.norm().max(f64::MIN_POSITIVE)),

@@ -16,7 +16,7 @@ pub(crate) fn add_tangents(
     stiffening: impl Fn(&DeformableMaterial) -> f64,
     mut add: impl FnMut(usize, usize, &Mat3),
 ) {
-    let Elements { model, materials, activation } = elements;
+    let Elements { model, materials, activations } = elements;
     let kept = |stiffness: f64| if projected { stiffness.max(0.0) } else { stiffness };
     let mut sides = Vec::new();
     model.for_each_energy(materials, |law, nodes, gradients, volume| {
@@ -40,7 +40,7 @@ pub(crate) fn add_tangents(
     }
     for stencil in &model.stencils {
         let sides = stencil.regions.map(|region| stiffening(&materials[region as usize]));
-        let tangent = length_energy(stencil, materials, *activation).tangent(&stencil.vector(x));
+        let tangent = length_energy(stencil, materials, activations).tangent(&stencil.vector(x));
         let mut K = tangent * (0.5 * (sides[0] + sides[1]));
         if projected {
             K = semidefinite(&K);
@@ -124,7 +124,7 @@ mod tests {
                 let material = DeformableMaterial::new(1e3, 0.3).fibre_modulus(500.0).elasticity(Elasticity::ALL[kind]);
                 let materials = [material, material.youngs_modulus(2e2).poisson_ratio(0.1)];
                 let materials = &materials[..model.regions().len()];
-                let elements = Elements { model: &model, materials, activation: 0.8 };
+                let elements = Elements { model: &model, materials, activations: &[0.8, 1.3] };
                 let x: Vec<Vec3> = model.rest.iter().enumerate().map(|(i, X)| {
                     X + Vec3::from_fn(|c, _| shakes[(3 * i + c) % shakes.len()])
                 }).collect();

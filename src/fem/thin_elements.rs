@@ -11,7 +11,11 @@ use crate::math::Vec3;
 
 /// The energy of a material's sheets.
 pub(super) fn membrane(material: &DeformableMaterial) -> Membrane {
-    Membrane::new(material.lame(), material.strain_limits, material.limit_weight())
+    let limits = material.strain_limits;
+    match &material.orthotropic {
+        None => Membrane::new(material.lame(), limits, material.limit_weight()),
+        Some(cloth) => Membrane::woven(cloth.plane_stress(), limits, cloth.limit_weight()),
+    }
 }
 
 /// What the weight per modulus of a stencil is to be multiplied by \[Pa\]. Two sides that differ share a moment, and each
@@ -38,7 +42,7 @@ fn modulus_of(kind: StencilKind, material: &DeformableMaterial) -> f64 {
 pub(super) fn length_energy(
     stencil: &Stencil,
     materials: &[DeformableMaterial],
-    activation: f64,
+    activations: &[f64],
 ) -> LengthEnergy {
     let weight = stencil.weight * modulus(stencil, materials);
     let material = &materials[stencil.regions[0] as usize];
@@ -47,7 +51,8 @@ pub(super) fn length_energy(
         .strain_limits
         .filter(|_| is_stretch)
         .map(|limits| (limits.map(|l| l * stencil.length), stencil.weight * material.limit_weight()));
-    let length = if stencil.kind == StencilKind::Fibre { activation } else { stencil.length };
+    let activation = || activations.get(stencil.regions[0] as usize).copied().unwrap_or(1.0);
+    let length = if stencil.kind == StencilKind::Fibre { activation() } else { stencil.length };
     LengthEnergy { length, weight, limits }
 }
 
@@ -59,14 +64,14 @@ pub(super) fn add_forces(
     x: &[Vec3],
     force: &mut [Vec3],
 ) -> f64 {
-    let Elements { model, materials, activation } = elements;
+    let Elements { model, materials, activations } = elements;
     let mut energy = 0.0;
     for (k, (region, material)) in model.regions.iter().zip(*materials).enumerate() {
         let ratio = ratios.get(k).copied().unwrap_or(0.0);
         energy += add_triangles(region, elements, material, (damping, ratio), x, force);
     }
     for (k, stencil) in model.stencils.iter().enumerate() {
-        let length_energy = length_energy(stencil, materials, *activation);
+        let length_energy = length_energy(stencil, materials, activations);
         let b = stencil.vector(x);
         let (mut own, mut pull) = length_energy.response(&b);
         if let Some(&length) = damping.lengths.get(k) {

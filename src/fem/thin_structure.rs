@@ -34,7 +34,10 @@ impl ThinElements {
         let mut hinges: BTreeMap<[u32; 2], Vec<(u32, f64, u32)>> = BTreeMap::new();
         for sheet in &structure.sheets {
             let (nodes, region) = (sheet.corners.map(&node), shares.place(sheet.region));
-            let triangle = TriangleElement::new(nodes, sheet.thickness, rest);
+            let mut triangle = TriangleElement::new(nodes, sheet.thickness, rest);
+            if let Some(warp) = sheet.warp {
+                triangle = triangle.woven(&warp.into(), rest);
+            }
             shares.add(region, &nodes, triangle.volume);
             thin.thicken(&nodes, sheet.thickness / 2.0);
             thin.triangles.push(TriangleElement { region, ..triangle });

@@ -1,9 +1,11 @@
 //! What a body is made of, in SI units.
 
 mod damping;
+mod orthotropic;
 mod presets;
 mod relaxation;
 
+pub use orthotropic::OrthotropicSheet;
 pub(crate) use relaxation::MAX_BRANCHES;
 pub use relaxation::MaxwellBranch;
 
@@ -14,7 +16,7 @@ use thiserror::Error;
 /// What is wrong with a material.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[non_exhaustive]
-#[error("material: {quantity} is {value}, but must be {range}")]
+#[error("material: {quantity} is {value}, but must be {range}{}", .bound.map_or(String::new(), |b| format!(", which is {b}")))]
 pub struct MaterialError {
     /// The quantity that is out of range.
     pub quantity: &'static str,
@@ -22,6 +24,14 @@ pub struct MaterialError {
     pub value: f64,
     /// The values that would be right.
     pub range: &'static str,
+    /// The bound, where it depends on other quantities.
+    pub bound: Option<f64>,
+}
+
+impl MaterialError {
+    pub(crate) fn new(quantity: &'static str, value: f64, range: &'static str) -> Self {
+        Self { quantity, value, range, bound: None }
+    }
 }
 
 /// Material of a deformable body. What you type is what you get: Young's modulus in pascals,
@@ -62,6 +72,8 @@ pub struct DeformableMaterial {
     pub strain_limits: Option<[f64; 2]>,
     /// Young's modulus of muscle fibres along their direction \[Pa\], of bodies that have such.
     pub fibre_modulus: f64,
+    /// Of triangles of woven sheets, in the place of Young's modulus and Poisson's ratio.
+    pub orthotropic: Option<OrthotropicSheet>,
 }
 
 impl DeformableMaterial {
@@ -81,6 +93,7 @@ impl DeformableMaterial {
             elasticity: Elasticity::default(),
             strain_limits: None,
             fibre_modulus: 0.0,
+            orthotropic: None,
         }
     }
 
@@ -164,7 +177,7 @@ impl DeformableMaterial {
     pub fn validate(&self) -> Result<(), MaterialError> {
         let check = |quantity, value: f64, range, fine: bool| match fine {
             true => Ok(()),
-            false => Err(MaterialError { quantity, value, range }),
+            false => Err(MaterialError::new(quantity, value, range)),
         };
         let positive = |quantity, v: f64| check(quantity, v, "positive and finite", v.is_finite() && v > 0.0);
         let not_negative =
@@ -188,7 +201,7 @@ impl DeformableMaterial {
             check("least stretch", least, "in [0, 1)", (0.0..1.0).contains(&least))?;
             check("largest stretch", largest, "above 1 and finite", largest.is_finite() && largest > 1.0)?;
         }
-        Ok(())
+        self.orthotropic.map_or(Ok(()), |sheet| sheet.validate())
     }
 
     /// μ = E/(2(1+ν)), λ = Eν/((1+ν)(1−2ν)).
@@ -216,6 +229,17 @@ mod tests {
     fn each_quantity_out_of_range_is_named_with_its_value() {
         let good = DeformableMaterial::new(1e6, 0.3);
         assert_eq!(good.validate(), Ok(()));
+        let cloth = |warp_modulus, weft_modulus, poisson_ratio, shear_modulus| {
+            let sheet = OrthotropicSheet { warp_modulus, weft_modulus, poisson_ratio, shear_modulus };
+            good.woven(sheet)
+        };
+        assert_eq!(cloth(1e6, 1e5, 3.1, 1e4).validate(), Ok(()));
+        assert_eq!(cloth(1e6, 1e5, -3.1, 1e4).validate(), Ok(()));
+        let bound = cloth(1e6, 1e5, -3.2, 1e4).validate().unwrap_err();
+        assert!(
+            bound.to_string().contains("-3.2") && bound.to_string().contains("which is 3.162"),
+            "{bound}"
+        );
         for (material, quantity) in [
             (DeformableMaterial::new(0.0, 0.3), "Young's modulus"),
             (DeformableMaterial::new(f64::NAN, 0.3), "Young's modulus"),
@@ -231,6 +255,11 @@ mod tests {
             (good.maxwell_branches([(0.1, 1.0), (0.1, 0.0)]), "time of a Maxwell branch"),
             (good.strain_limits(1.0, 1.1), "least stretch"),
             (good.strain_limits(0.9, f64::NAN), "largest stretch"),
+            (cloth(0.0, 1e5, 0.2, 1e4), "warp modulus of the sheet"),
+            (cloth(1e6, f64::NAN, 0.2, 1e4), "weft modulus of the sheet"),
+            (cloth(1e6, 1e5, 0.2, -1.0), "shear modulus of the sheet"),
+            (cloth(1e6, 1e5, 3.2, 1e4), "Poisson's ratio of the sheet"),
+            (cloth(1e6, 1e5, f64::NAN, 1e4), "Poisson's ratio of the sheet"),
         ] {
             let error = material.validate().unwrap_err();
             assert_eq!(error.quantity, quantity);

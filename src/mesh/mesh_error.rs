@@ -78,6 +78,14 @@ pub enum MeshError {
         /// Its longest edge \[m\].
         edge: f64,
     },
+    /// A direction of the warp that is none in the plane of its triangle.
+    #[error("the warp {direction:?} of triangle {triangle} is normal to it, or not finite")]
+    BadWarp {
+        /// Index of the triangle.
+        triangle: usize,
+        /// The direction given.
+        direction: [f64; 3],
+    },
     /// A rod or spring ends outside the vertex list.
     #[error("the edge {ends:?} refers to vertex {vertex}, but there are {vertices} vertices")]
     EndOutOfRange {

@@ -14,6 +14,7 @@ mod structure_check;
 mod surface;
 mod tet_mesh;
 mod volumes;
+mod warp;
 
 pub use mesh_error::MeshError;
 pub(crate) use ordering::{node_adjacency, sweep_order};

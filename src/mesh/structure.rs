@@ -40,6 +40,8 @@ pub(crate) struct SheetTriangle {
     pub corners: [u32; 3],
     pub thickness: f64,
     pub region: u32,
+    /// Direction of the warp, not normal to the triangle.
+    pub warp: Option<[f64; 3]>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -157,7 +159,8 @@ impl Structure {
         for (triangle, corners) in (first..).zip(triangles) {
             self.check_triangle(triangle, corners)?;
         }
-        self.sheets.extend(triangles.iter().map(|&corners| SheetTriangle { corners, thickness, region: 0 }));
+        let sheet = |&corners: &[u32; 3]| SheetTriangle { corners, thickness, region: 0, warp: None };
+        self.sheets.extend(triangles.iter().map(sheet));
         self.check_sheets()?;
         Ok(self)
     }

@@ -42,6 +42,7 @@ impl TryFrom<Unchecked> for Structure {
         for (triangle, sheet) in structure.sheets.iter().enumerate() {
             check_size("thickness", sheet.thickness)?;
             structure.check_triangle(triangle, &sheet.corners)?;
+            structure.check_warp(triangle, sheet)?;
         }
         structure.check_sheets()?;
         let size = structure.size();

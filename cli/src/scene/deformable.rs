@@ -1,6 +1,6 @@
 //! Deformable bodies: what they are made of, and how they are solved.
 
-use super::{Shape, Vec3};
+use super::{Material, Shape, Vec3};
 use foible3d::CavityFilling;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -40,6 +40,8 @@ pub struct Deformable {
     #[serde(default)]
     #[schemars(with = "Vec<RegionMaterial>")]
     pub regions: Vec<Spanned<RegionMaterial>>,
+    /// Direction of the warp of woven sheets in the body's own frame, projected on each triangle.
+    pub warp: Option<Vec3>,
     /// What fills its closed rooms, the largest first.
     #[serde(default)]
     #[schemars(with = "Vec<Filling>")]
@@ -177,92 +179,10 @@ pub struct RegionMaterial {
     pub within: Option<Region>,
     /// Elements of this physical group of a Gmsh file.
     pub group: Option<String>,
+    /// Direction of the warp of its woven sheets, if it is not the body's.
+    pub warp: Option<Vec3>,
     /// What it is made of.
     pub material: Material,
-}
-
-/// What a soft body is made of.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Material {
-    /// Young's modulus \[Pa\].
-    pub youngs_modulus: f64,
-    /// Poisson's ratio, up to 0.4999.
-    pub poisson_ratio: f64,
-    /// \[kg/m³\] (1000).
-    #[serde(default = "density")]
-    pub density: f64,
-    /// Coefficient of friction (0.5).
-    #[serde(default = "soft_friction")]
-    pub friction: f64,
-    /// Coefficient of restitution.
-    #[serde(default)]
-    pub restitution: f64,
-    /// Mass damping \[1/s\].
-    #[serde(default)]
-    pub mass_damping: f64,
-    /// Stiffness damping \[s\].
-    #[serde(default)]
-    pub stiffness_damping: f64,
-    /// The elastic law.
-    #[serde(default)]
-    pub elasticity: Elasticity,
-    /// Least and largest stretch.
-    pub strain_limits: Option<[f64; 2]>,
-    /// Up to four terms of a Prony series, each `[ratio, time]`: stiffness over the lasting one, and seconds.
-    #[serde(default)]
-    pub maxwell_branches: Vec<[f64; 2]>,
-}
-
-fn density() -> f64 {
-    1000.0
-}
-
-fn soft_friction() -> f64 {
-    0.5
-}
-
-/// The elastic law.
-#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Elasticity {
-    /// Linear in strains, rotations taken off.
-    #[default]
-    LinearCorotated,
-    /// Projective Dynamics' own.
-    Projective,
-    /// Exact in volume, rotations taken off.
-    FixedCorotated,
-    /// Stable neo-Hookean.
-    NeoHookean,
-}
-
-impl Material {
-    /// The material of the crate.
-    pub fn to_material(&self) -> foible3d::DeformableMaterial {
-        let material = foible3d::DeformableMaterial::new(self.youngs_modulus, self.poisson_ratio)
-            .density(self.density)
-            .friction(self.friction)
-            .restitution(self.restitution)
-            .mass_damping(self.mass_damping)
-            .stiffness_damping(self.stiffness_damping)
-            .elasticity(match self.elasticity {
-                Elasticity::LinearCorotated => foible3d::Elasticity::LinearCorotated,
-                Elasticity::Projective => foible3d::Elasticity::Projective,
-                Elasticity::FixedCorotated => foible3d::Elasticity::FixedCorotated,
-                Elasticity::NeoHookean => foible3d::Elasticity::NeoHookean,
-            });
-        let branch =
-            |k: usize| self.maxwell_branches.get(k).map_or((0.0, 0.0), |[ratio, time]| (*ratio, *time));
-        let material = match self.maxwell_branches.is_empty() {
-            true => material,
-            false => material.maxwell_branches([branch(0), branch(1), branch(2), branch(3)]),
-        };
-        match self.strain_limits {
-            Some([least, largest]) => material.strain_limits(least, largest),
-            None => material,
-        }
-    }
 }
 
 /// A box of the world.

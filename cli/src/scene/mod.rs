@@ -6,6 +6,7 @@ mod control;
 mod deformable;
 mod drop;
 mod expectation;
+mod material;
 mod mistake;
 mod rigid;
 mod schema;
@@ -16,11 +17,12 @@ mod values;
 pub use actuation::{ActuatorEntry, Cable, Command, Drives, RoutePoint};
 pub use control::{Attach, Move};
 pub use deformable::{
-    Body, Deformable, Elasticity, Fidelity, Filling, Frames, Integrator, Material, Region, RegionMaterial,
-    Regions, Solver, SolverKind, System,
+    Body, Deformable, Fidelity, Filling, Frames, Integrator, Region, RegionMaterial, Regions, Solver,
+    SolverKind, System,
 };
 pub use drop::{Axis, Drop, Entry, Fit, FitRange, Mode, Orientations, Random, Range, Scale, Sweep};
 pub use expectation::{Curve, Expect, Holds, Probe, Quantity, Take};
+pub use material::{Elasticity, Material, WovenSheet};
 pub use mistake::SceneError;
 pub use rigid::{Joint, JointKind, Kind, Motor, Part, Rigid, Shape, Switch};
 pub use schema::schema;

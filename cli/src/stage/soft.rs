@@ -96,9 +96,17 @@ fn filled(builder: DeformableBodyBuilder, body: &scene::Deformable) -> Result<De
     Ok(fillings.fold(builder, |builder, (cavity, filling)| builder.fill_cavity(cavity, filling)))
 }
 
-/// Materials of boxes; later ones over earlier ones. Region 0 is what is in none.
-fn with_boxes(builder: DeformableBodyBuilder, regions: &Regions) -> DeformableBodyBuilder {
+/// Materials and warps of boxes; later ones over earlier ones. Region 0 is what is in none.
+fn with_boxes(builder: DeformableBodyBuilder, body: &scene::Deformable) -> DeformableBodyBuilder {
+    let regions: &Regions = &body.regions;
     let boxes: Vec<scene::Region> = regions.iter().filter_map(|region| region.as_ref().within).collect();
+    let warp = |x| {
+        let place = boxes.iter().rposition(|region| is_within(region, x));
+        let own = place.and_then(|k| regions[k].as_ref().warp);
+        own.or(body.warp).unwrap_or_default().map(f64::from)
+    };
+    let is_woven = body.warp.is_some() || regions.iter().any(|region| region.as_ref().warp.is_some());
+    let builder = if is_woven { builder.warp(warp) } else { builder };
     if boxes.is_empty() {
         return builder;
     }
@@ -176,7 +184,7 @@ fn solved_by(builder: DeformableBodyBuilder, asked: &scene::Solver) -> Deformabl
 
 /// A body as its file describes it.
 pub(super) fn deformable(body: &scene::Deformable, folder: &Path) -> Result<DeformableBodyBuilder, String> {
-    let builder = solved_by(with_boxes(mesh(body, folder)?, &body.regions), &body.solver);
+    let builder = solved_by(with_boxes(mesh(body, folder)?, body), &body.solver);
     let builder = builder
         .pose(pose(body.translation, body.rotation))
         .linvel(body.linvel.into())

@@ -20,7 +20,7 @@ impl BodyProblem {
             settings: *body.settings(),
             materials: body.materials.clone(),
             mass_damping: 0.0,
-            activation: body.activation,
+            activations: body.activations.clone(),
             cavities: Vec::new(),
             h,
             dt: h,
@@ -102,7 +102,7 @@ impl BodyProblem {
         self.settings = *body.settings();
         self.materials.clone_from(&body.materials);
         self.mass_damping = body.model.mass_damping(&body.materials);
-        self.activation = body.activation;
+        self.activations.clone_from(&body.activations);
         self.read_cavities(&body.fillings, &body.state.x);
         self.step_damping = self.scale;
         self.guard_retries = 0;

@@ -150,8 +150,8 @@ impl BodyProblem {
         }
         self.scheme = Scheme::ImplicitEuler;
         (self.h, self.reach, self.scale) = (self.dt, self.dt, 1.0);
-        let (model, materials, activation) = (&*self.model, &self.materials, self.activation);
-        let elements = Elements { model, materials, activation };
+        let (model, materials, activations) = (&*self.model, &self.materials, &self.activations);
+        let elements = Elements { model, materials, activations };
         self.damping.begin(&elements, self.h, &self.x_start, None);
         (self.step_damping, self.kinetic_bound) = (1.0, f64::INFINITY);
         true

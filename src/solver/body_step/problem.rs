@@ -54,7 +54,7 @@ pub(crate) struct BodyProblem {
     pub(super) materials: Vec<DeformableMaterial>,
     /// α [1/s].
     pub(super) mass_damping: f64,
-    pub(super) activation: f64,
+    pub(super) activations: Vec<f64>,
     pub(super) cavities: Vec<FilledCavity>,
     /// The step that the objective is of \[s\], and that by which time goes on.
     pub(super) h: f64,
@@ -127,7 +127,7 @@ pub(crate) struct Iterate {
 impl BodyProblem {
     /// What is elastic in the body.
     pub fn elements(&self) -> Elements<'_> {
-        Elements { model: &self.model, materials: &self.materials, activation: self.activation }
+        Elements { model: &self.model, materials: &self.materials, activations: &self.activations }
     }
 
     pub fn masses(&self) -> &[f64] {
@@ -161,8 +161,8 @@ impl BodyProblem {
 
     /// Lets the dampers of the body give way by what the step has come to.
     pub fn give_way(&mut self, dampers: &mut Dampers) {
-        let (model, materials, activation) = (&*self.model, &self.materials, self.activation);
-        self.damping.end(&Elements { model, materials, activation }, self.dt, &self.current.x, dampers);
+        let (model, materials, activations) = (&*self.model, &self.materials, &self.activations);
+        self.damping.end(&Elements { model, materials, activations }, self.dt, &self.current.x, dampers);
     }
 
     /// Mean velocity of a node in the step [m/s].
@@ -274,8 +274,8 @@ impl BodyProblem {
     pub(super) fn evaluate(&mut self, at: &mut Iterate, limit: f64) {
         at.r.clear();
         at.r.resize(at.x.len(), Vec3::zeros());
-        let (model, materials, activation) = (&*self.model, &self.materials, self.activation);
-        let elements = Elements { model, materials, activation };
+        let (model, materials, activations) = (&*self.model, &self.materials, &self.activations);
+        let elements = Elements { model, materials, activations };
         let filled = self.add_cavity_forces(at);
         let limit = limit / self.scale - filled;
         let place = Evaluation { damping: &self.damping, x: &at.x, frame: &self.frame, limit };

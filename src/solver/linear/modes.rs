@@ -58,7 +58,9 @@ impl DeformableBody {
     /// # Errors
     /// [`BodyError::Unstable`] where the stiffness has a negative mode, as of what is about to buckle.
     pub fn modes(&self, count: usize) -> Result<Vec<DeformableMode>, BodyError> {
-        let ladder = |m: &DeformableMaterial| m.youngs_modulus.max(m.fibre_modulus) / m.density;
+        let woven =
+            |m: &DeformableMaterial| m.orthotropic.map_or(0.0, |s| s.warp_modulus.max(s.weft_modulus));
+        let ladder = |m: &DeformableMaterial| m.youngs_modulus.max(m.fibre_modulus).max(woven(m)) / m.density;
         let stiffest = self.materials.iter().map(ladder).fold(0.0, f64::max);
         let shift = SHIFT * stiffest / (self.model.size * self.model.size);
         let operator = ShiftedInverse::new(self, shift)?;

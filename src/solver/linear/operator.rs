@@ -91,7 +91,7 @@ impl StiffnessOperator {
     }
 
     fn elements(&self) -> Elements<'_> {
-        Elements { model: &self.model, materials: &self.materials, activation: 1.0 }
+        Elements { model: &self.model, materials: &self.materials, activations: &[] }
     }
 
     /// `out = A v`; v is zero at pinned nodes.

@@ -38,6 +38,8 @@ struct MaterialKey {
     elasticity: Elasticity,
     /// Bits of E, ν, ρ, α, β, and the modulus of fibres.
     bits: [u64; 6],
+    /// Bits of the constants of woven sheets; zero without.
+    sheet: [u64; 4],
     /// Bits of ratios and times.
     branches: [[u64; 2]; MAX_BRANCHES],
 }
@@ -47,7 +49,11 @@ impl MaterialKey {
         let [e, nu, rho] = [m.youngs_modulus, m.poisson_ratio, m.density];
         let bits = [e, nu, rho, m.mass_damping, m.stiffness_damping, m.fibre_modulus].map(f64::to_bits);
         let branches = m.maxwell_branches.map(|branch| [branch.ratio, branch.time].map(f64::to_bits));
-        Self { elasticity: m.elasticity, bits, branches }
+        let sheet = m.orthotropic.map_or([0; 4], |sheet| {
+            [sheet.warp_modulus, sheet.weft_modulus, sheet.poisson_ratio, sheet.shear_modulus]
+                .map(f64::to_bits)
+        });
+        Self { elasticity: m.elasticity, bits, sheet, branches }
     }
 }
 
@@ -135,7 +141,7 @@ pub(crate) fn assemble(
     symbolic: &Symbolic,
 ) -> Vec<f64> {
     let mut matrix = Upper::new(model, materials, pins, system, h, symbolic);
-    let elements = Elements { model, materials, activation: 1.0 };
+    let elements = Elements { model, materials, activations: &[] };
     let stiffening = |material: &DeformableMaterial| material.stiffening(h);
     add_blocks(&elements, system, stiffening, |i, j, block| matrix.add_elastic(i, j, block));
     matrix.values
