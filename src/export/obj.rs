@@ -8,9 +8,9 @@ use std::fmt::Write;
 use std::path::Path;
 
 impl DeformableWorld {
-    /// Writes what all bodies look like ([`DeformableSurfaceMesh`]) to an OBJ file \[m\], each as an object `body_k` with its
-    /// normals, k counting from nought in the order of the set. A file per frame makes a sequence that Blender and Houdini read;
-    /// the order of vertices does not change.
+    /// Writes what all bodies look like ([`DeformableSurfaceMesh`](crate::DeformableSurfaceMesh)) to an OBJ file \[m\], each as an
+    /// object `body_k` with its normals, k counting from nought in the order of the set. A file per frame makes a sequence that Blender
+    /// and Houdini read; the order of vertices does not change.
     ///
     /// ```
     /// use foible3d::prelude::*;
