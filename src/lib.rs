@@ -110,7 +110,7 @@ pub use coupling::{
 pub use energy::{CavityFilling, Elasticity};
 pub use error::{ActuatorError, BodyError, DeformableBodyError, HandleError};
 #[cfg(feature = "export")]
-pub use export::VtkSeries;
+pub use export::{GltfRecording, SurfaceSequence, VtkSeries};
 pub use fem::{DeformableCavity, DeformableModel, SystemMatrix};
 pub use material::{DeformableMaterial, MaterialError, MaxwellBranch, OrthotropicSheet};
 pub use mesh::{

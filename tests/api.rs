@@ -66,11 +66,14 @@ fn every_type_of_the_surface_is_promised_to_be_thread_safe() {
     #[cfg(feature = "debug-render")]
     is_thread_safe::<(DeformableDebugRenderPipeline, DeformableDebugRenderStyle)>();
     #[cfg(feature = "export")]
-    is_thread_safe::<foible3d::VtkSeries>();
+    is_thread_safe::<(foible3d::VtkSeries, foible3d::SurfaceSequence, foible3d::GltfRecording)>();
     let missing: Vec<_> =
         exported.iter().filter(|name| !promised.contains(name) && !traits.contains(name)).collect();
     // Of features, and promised above.
-    let is_of_a_feature = |name: &str| name.starts_with("DeformableDebugRender") || name == "VtkSeries";
+    let is_of_a_feature = |name: &str| {
+        name.starts_with("DeformableDebugRender")
+            || ["VtkSeries", "SurfaceSequence", "GltfRecording"].contains(&name)
+    };
     let missing: Vec<_> = missing.iter().filter(|name| !is_of_a_feature(name)).collect();
     assert!(missing.is_empty(), "{missing:?}");
 }

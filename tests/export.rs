@@ -2,8 +2,8 @@
 #![cfg(all(feature = "export", feature = "import"))]
 mod common;
 use common::world_with_floor;
-use foible3d::VtkSeries;
 use foible3d::prelude::*;
+use foible3d::{SurfaceSequence, VtkSeries};
 use rapier3d::prelude::*;
 use std::path::{Path, PathBuf};
 use vtkio::Vtk;
@@ -132,6 +132,80 @@ fn surfaces_are_objects_of_one_file() {
     std::fs::remove_dir_all(path.parent().unwrap()).unwrap();
 }
 
+/// Numbers of a vertex of a PLY file, eleven each, and corners of its faces.
+fn ply(path: &Path) -> (Vec<[f32; 11]>, Vec<[u32; 3]>) {
+    let bytes = std::fs::read(path).unwrap();
+    let head = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    let text = std::str::from_utf8(&bytes[..head]).unwrap();
+    assert!(text.contains("format binary_little_endian 1.0"), "{text}");
+    let count = |name: &str| text.split(name).nth(1).unwrap().split_whitespace().next().unwrap().parse();
+    let (vertices, faces): (usize, usize) =
+        (count("element vertex").unwrap(), count("element face").unwrap());
+    assert_eq!(bytes.len() - head, 44 * vertices + 13 * faces);
+    let (vertices, faces) = bytes[head..].split_at(44 * vertices);
+    let words =
+        |bytes: &[u8]| bytes.as_chunks::<4>().0.iter().map(|w| u32::from_le_bytes(*w)).collect::<Vec<_>>();
+    let vertices = vertices.chunks(44).map(|v| {
+        let words = words(v);
+        std::array::from_fn(|k| if k < 10 { f32::from_bits(words[k]) } else { words[k] as f32 })
+    });
+    let faces = faces.chunks(13).map(|face| {
+        assert_eq!(face[0], 3);
+        words(&face[1..]).try_into().unwrap()
+    });
+    (vertices.collect(), faces.collect())
+}
+
+#[test]
+fn sequences_keep_the_order_of_vertices_and_tell_velocity_and_stress() {
+    let (mut physics, mut world) = scene();
+    let folder = folder("sequence");
+    let mut objects = SurfaceSequence::new(folder.join("run.obj")).unwrap();
+    let mut points = SurfaceSequence::new(folder.join("run.PLY")).unwrap();
+    let mut files = Vec::new();
+    for step in 0..40 {
+        world.step(&mut physics);
+        if step % 10 == 9 {
+            files.push((objects.push(&world).unwrap(), points.push(&world).unwrap()));
+        }
+    }
+    assert_eq!((points.len(), files[3].1.file_name().unwrap().to_str()), (4, Some("run_00003.PLY")));
+    let (_, first) = ply(&files[0].1);
+    for (obj, own) in &files {
+        let (vertices, faces) = ply(own);
+        assert!(faces == first);
+        // As text and as bits, one number.
+        let text = std::fs::read_to_string(obj).unwrap();
+        let numbers =
+            |l: &str, by: char| l.split([' ', by]).skip(1).flat_map(str::parse::<f32>).collect::<Vec<_>>();
+        let of = |kind: &'static str| text.lines().filter(move |l| l.starts_with(kind));
+        assert!(of("v ").zip(&vertices).all(|(line, v)| numbers(line, ' ') == v[..3]));
+        let corner = |line: &str, k: usize| numbers(line, '/')[2 * k] as u32 - 1;
+        assert!(of("f ").zip(&faces).all(|(line, face)| [0, 1, 2].map(|k| corner(line, k)) == *face));
+        assert_eq!([of("v ").count(), of("f ").count()], [vertices.len(), faces.len()]);
+    }
+    let (vertices, _) = ply(&files[3].1);
+    for (k, (_, body)) in world.bodies.iter().enumerate() {
+        let stresses = body.vertex_stresses();
+        let of_body: Vec<_> = vertices.iter().filter(|v| v[10] == k as f32).collect();
+        assert!(!of_body.is_empty());
+        for v in of_body.iter().filter(|_| k == 0) {
+            let near = |n: &usize| {
+                (Vector::from(body.position(*n).unwrap().map(|c| c as f32)) - Vector::new(v[0], v[1], v[2]))
+                    .length()
+                    < 1e-6
+            };
+            let vertex = (0..body.vertex_count()).find(near).unwrap();
+            let velocity = body.velocity(vertex).unwrap();
+            (0..3).for_each(|axis| assert_eq!(v[6 + axis], velocity[axis] as f32));
+            assert_eq!(v[9], stresses[vertex].von_mises() as f32);
+        }
+        assert_eq!(of_body.iter().all(|v| v[9].is_nan()), k > 1, "ropes and networks have none");
+    }
+    assert!(SurfaceSequence::new("run.fbx").unwrap_err().to_string().contains("`fbx`"));
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
 /// Written by this crate, read by meshio, which python3 has to find.
 #[test]
 #[ignore = "slow: needs python with meshio"]
@@ -140,10 +214,20 @@ fn an_independent_reader_agrees() {
     (0..60).for_each(|_| world.step(&mut physics));
     let path = folder("meshio").join("scene.vtu");
     world.write_vtu(&path).unwrap();
-    let script = "import meshio, sys; m = meshio.read(sys.argv[1]); \
+    let [ply, obj] = ["scene.ply", "scene.obj"].map(|name| path.with_file_name(name));
+    world.write_ply(&ply).unwrap();
+    world.write_obj(&obj).unwrap();
+    let script = "import meshio, sys; p = meshio.read(sys.argv[2]); o = meshio.read(sys.argv[3]); \
+        assert abs(p.points - o.points).max() < 1e-6; assert (p.cells_dict['triangle'] == o.cells_dict['triangle']).all(); \
+        assert p.point_data['von_mises'][:50].min() > 0 and abs(p.point_data['vy']).max() > 0; m = meshio.read(sys.argv[1]); \
+        assert len(p.points) > 200; import sys; m = meshio.read(sys.argv[1]); \
         print(len(m.points), *(len(c.data) for c in m.cells), m.points[7][1], \
         float(m.cell_data['von_mises'][0][3]), float(m.point_data['velocity'][7][1]), m.cell_data['cauchy_stress'][0].shape[1])";
-    let answer = std::process::Command::new("python3").args(["-c", script]).arg(&path).output().unwrap();
+    let answer = std::process::Command::new("python3")
+        .args(["-c", script])
+        .args([&path, &ply, &obj])
+        .output()
+        .unwrap();
     let said = String::from_utf8_lossy(&answer.stdout).into_owned();
     assert!(answer.status.success(), "{said} {}", String::from_utf8_lossy(&answer.stderr));
     let words: Vec<f64> = said.split_whitespace().map(|word| word.parse().unwrap()).collect();

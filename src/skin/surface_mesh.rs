@@ -43,19 +43,35 @@ const SIDES: u32 = 10;
 impl DeformableSurfaceMesh {
     /// Of a model's rest shape.
     pub fn new(model: &DeformableModel) -> Self {
-        let mut mesh = Self::default();
-        mesh.add_solids(model);
-        mesh.add_sheets(model);
-        for nodes in model.rods() {
-            mesh.add_tube(model, &nodes);
-        }
-        mesh
+        Self::with_nodes(model).0
     }
 
-    fn push(&mut self, vertex: &Vec3, normal: &Vec3) -> u32 {
-        self.vertices.push(to_real(vertex));
-        self.normals.push(to_real(normal));
-        self.vertices.len() as u32 - 1
+    /// Of a model's rest shape, and the node that each vertex belongs to.
+    pub(crate) fn with_nodes(model: &DeformableModel) -> (Self, Vec<u32>) {
+        let mut draft = Draft::default();
+        draft.add_solids(model);
+        draft.add_sheets(model);
+        for nodes in model.rods() {
+            draft.add_tube(model, &nodes);
+        }
+        (draft.mesh, draft.nodes)
+    }
+}
+
+/// A mesh while it is put together.
+#[derive(Default)]
+struct Draft {
+    mesh: DeformableSurfaceMesh,
+    /// The node of each vertex.
+    nodes: Vec<u32>,
+}
+
+impl Draft {
+    fn push(&mut self, node: u32, vertex: &Vec3, normal: &Vec3) -> u32 {
+        self.mesh.vertices.push(to_real(vertex));
+        self.mesh.normals.push(to_real(normal));
+        self.nodes.push(node);
+        self.nodes.len() as u32 - 1
     }
 
     /// A node becomes as many vertices as its triangles have normals that are far apart.
@@ -76,9 +92,9 @@ impl DeformableSurfaceMesh {
                 let normal = normal.try_normalize(0.0).unwrap_or(directions[i]);
                 let key = (node, [normal.x, normal.y, normal.z].map(f64::to_bits));
                 let position = &model.rest[node as usize];
-                *made.entry(key).or_insert_with(|| self.push(position, &normal))
+                *made.entry(key).or_insert_with(|| self.push(node, position, &normal))
             });
-            self.triangles.push(corners);
+            self.mesh.triangles.push(corners);
         }
     }
 
@@ -92,12 +108,12 @@ impl DeformableSurfaceMesh {
                     let n = node as usize;
                     let normal = if is_front { normals[n] } else { -normals[n] };
                     let position = model.rest[n] + normal * model.half_thickness[n];
-                    *made.entry((node, is_front)).or_insert_with(|| self.push(&position, &normal))
+                    *made.entry((node, is_front)).or_insert_with(|| self.push(node, &position, &normal))
                 });
                 if !is_front {
                     corners.swap(1, 2);
                 }
-                self.triangles.push(corners);
+                self.mesh.triangles.push(corners);
             }
         }
         let edge_count = sheets.iter().flat_map(edges).fold(HashMap::new(), |mut count, [a, b]| {
@@ -115,17 +131,18 @@ impl DeformableSurfaceMesh {
         let along = model.rest[b] - model.rest[a];
         let mut corner = |n: usize, side: f64| {
             let outward = along.cross(&normals[n]).try_normalize(0.0).unwrap_or_default();
-            self.push(&(model.rest[n] + normals[n] * (side * model.half_thickness[n])), &outward)
+            let place = model.rest[n] + normals[n] * (side * model.half_thickness[n]);
+            self.push(n as u32, &place, &outward)
         };
         let [p, q, r, s] = [corner(a, 1.0), corner(a, -1.0), corner(b, -1.0), corner(b, 1.0)];
-        self.triangles.extend([[p, q, r], [p, r, s]]);
+        self.mesh.triangles.extend([[p, q, r], [p, r, s]]);
     }
 
     fn add_tube(&mut self, model: &DeformableModel, nodes: &[u32]) {
         let mut along = Vec::new();
         frames(nodes.iter().map(|n| model.rest[*n as usize]), None, &mut along);
         let Some(last) = along.len().checked_sub(1) else { return };
-        let first_vertex = self.vertices.len() as u32;
+        let first_vertex = self.nodes.len() as u32;
         for (k, node) in nodes.iter().enumerate() {
             // Between two segments half-way from one's directions to the other's.
             let (before, after) = (&along[k.saturating_sub(1)], &along[k.min(last)]);
@@ -135,35 +152,37 @@ impl DeformableSurfaceMesh {
             for side in 0..SIDES {
                 let angle = TAU * f64::from(side) / f64::from(SIDES);
                 let normal = a * angle.cos() + b * angle.sin();
-                self.push(&(centre + normal * radius), &normal);
+                self.push(*node, &(centre + normal * radius), &normal);
             }
         }
         let at = |k: u32, side: u32| first_vertex + k * SIDES + side % SIDES;
         for k in 0..=last as u32 {
             for side in 0..SIDES {
                 let [p, q, r, s] = [at(k, side), at(k, side + 1), at(k + 1, side), at(k + 1, side + 1)];
-                self.triangles.extend([[p, q, r], [q, s, r]]);
+                self.mesh.triangles.extend([[p, q, r], [q, s, r]]);
             }
         }
         let ends = [(0, -along[0][2]), (last as u32 + 1, along[last][2])];
         for (k, outward) in ends {
-            self.add_cap(&model.rest[nodes[k as usize] as usize], &outward, at(k, 0), k == 0);
+            let node = nodes[k as usize];
+            self.add_cap(node, (&model.rest[node as usize], &outward), at(k, 0), k == 0);
         }
     }
 
     /// A disc over the ring of vertices from `ring` on.
-    fn add_cap(&mut self, centre: &Vec3, outward: &Vec3, ring: u32, is_start: bool) {
-        let centre = self.push(centre, outward);
+    fn add_cap(&mut self, node: u32, (centre, outward): (&Vec3, &Vec3), ring: u32, is_start: bool) {
+        let centre = self.push(node, centre, outward);
         let rim: Vec<u32> = (ring..ring + SIDES)
             .map(|vertex| {
-                self.vertices.push(self.vertices[vertex as usize]);
-                self.normals.push(to_real(outward));
-                self.vertices.len() as u32 - 1
+                self.mesh.vertices.push(self.mesh.vertices[vertex as usize]);
+                self.mesh.normals.push(to_real(outward));
+                self.nodes.push(node);
+                self.nodes.len() as u32 - 1
             })
             .collect();
         for side in 0..rim.len() {
             let (p, q) = (rim[side], rim[(side + 1) % rim.len()]);
-            self.triangles.push(if is_start { [centre, q, p] } else { [centre, p, q] });
+            self.mesh.triangles.push(if is_start { [centre, q, p] } else { [centre, p, q] });
         }
     }
 }
