@@ -54,6 +54,7 @@ pub(crate) use constraint_memory::{
     ConstraintMemory, Feature, JointAxis, ObstacleContact, RigidPairContact, SoftPairContact, SoftPairKind,
 };
 pub use contacts::{DeformableContact, DeformablePairContact};
+pub(crate) use factor_base::FactorBase;
 pub use handle::{
     DeformableAttachmentHandle, DeformableBodyHandle, DeformableCableHandle, DeformableContactPartner,
 };

@@ -202,7 +202,7 @@ pub(crate) fn polar_factor(F: &Mat3x2) -> Mat3x2 {
 
 /// Orthonormal directions u in space, stretches σ ≥ 0 and directions v in the sheet with `F v = σ u`. What
 /// has no length takes any direction.
-fn principal_axes(F: &Mat3x2) -> ([Vec3; 2], [f64; 2], Mat2) {
+pub(crate) fn principal_axes(F: &Mat3x2) -> ([Vec3; 2], [f64; 2], Mat2) {
     let C = F.tr_mul(F);
     if !C.iter().all(|v| v.is_finite()) {
         return ([Vec3::x(), Vec3::y()], [1.0; 2], Mat2::identity());

@@ -24,12 +24,15 @@ mod thin_elements;
 
 mod frames;
 
+mod hard_limits;
+
 pub(crate) mod constant_matrix;
 mod tangents;
 
 pub use cavities::DeformableCavity;
 pub use constant_matrix::SystemMatrix;
 pub(crate) use frames::{floating_frame, node_rotations, volume};
+pub(crate) use hard_limits::{HardLimiting, Holds, Room, is_beyond_hard_limits};
 pub use model::DeformableModel;
 pub(crate) use model::{Build, Elements};
 pub(crate) use stiffness_damping::{Dampers, StiffnessDamping, are_dampers, branch_strain, relaxed};

@@ -118,6 +118,9 @@ pub struct DeformableCounters {
     pub solves: usize,
     /// Bytes of factors that those solves read: every number twice.
     pub solve_bytes: usize,
+    /// Sweeps that brought bodies back within hard limits of strain
+    /// ([`DeformableMaterial::hard_strain_limits`](crate::DeformableMaterial::hard_strain_limits)), at most 400 a body.
+    pub limit_sweeps: usize,
     /// Newton steps of the contact problems.
     pub newton_steps: usize,
     /// Sweeps over the contacts of islands.
@@ -175,6 +178,7 @@ impl DeformableCounters {
         self.elements += report.counters.elements;
         self.solves += report.counters.solves;
         self.solve_bytes += report.counters.solve_bytes;
+        self.limit_sweeps += report.counters.limit_sweeps;
         self.element_time += report.counters.element_time;
         self.linear_time += report.counters.linear_time;
         self.contact_time += report.counters.contact_time;

@@ -89,6 +89,7 @@ impl Island {
             self.redo_steps_that_gain_energy(context);
             self.reject_steps_that_gain_energy(context);
         }
+        self.limit_strains();
         self.bodies.iter().for_each(|b| self.report.counters.add(&b.preconditioner.counters));
     }
 
@@ -165,6 +166,18 @@ impl Island {
                 .iter_mut()
                 .filter_map(|b| b.gained().then_some(b))
                 .for_each(BodyProblem::bound_energy);
+        }
+    }
+
+    /// Brings stretches back within hard limits.
+    fn limit_strains(&mut self) {
+        let in_flight = self.contacts.active.is_empty();
+        for index in 0..self.bodies.len() {
+            let body = &mut self.bodies[index];
+            if body.is_beyond_hard_limits() {
+                self.contacts.hold(index, body);
+                self.report.counters.limit_sweeps += body.limit_strains(in_flight);
+            }
         }
     }
 

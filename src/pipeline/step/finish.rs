@@ -104,7 +104,7 @@ pub(super) fn store(
     if problem.is_rejected {
         body.state.history.clear();
     }
-    if is_limited {
+    if is_limited || problem.was_limited() {
         // What a step of the second order has left unsolved grows by its extrapolation: the next one is of the first.
         body.state.history.x.clear();
         body.state.history.v.clear();

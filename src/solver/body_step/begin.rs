@@ -43,6 +43,7 @@ impl BodyProblem {
             contact_force: vec![Vec3::zeros(); n],
             contact_change: Vec::new(),
             preconditioner: Preconditioner::default(),
+            limiting: Default::default(),
             step_damping: 1.0,
             guard_retries: 0,
             is_rejected: false,
@@ -108,6 +109,7 @@ impl BodyProblem {
         self.guard_retries = 0;
         self.is_rejected = false;
         self.was_redone = false;
+        self.begin_limits();
         self.kinetic_bound = f64::INFINITY;
         self.preconditioner.counters = SolveCounters::default();
         self.read_state(body);

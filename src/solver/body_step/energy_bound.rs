@@ -46,6 +46,11 @@ impl BodyProblem {
         }
     }
 
+    /// Lets velocities at the end of the step hold what it leaves where hard limits have brought the body to.
+    pub(super) fn bound_velocities(&mut self, in_flight: bool) {
+        self.measure_energy(in_flight);
+    }
+
     /// Whether so much is left of the iteration that it is worth an evaluation to know what the step has made, and it has
     /// made energy.
     pub fn gained(&mut self) -> bool {
@@ -96,7 +101,7 @@ impl BodyProblem {
             let moved = self.current.x[i] - x[i];
             work += if pins.next_if(|&&p| p as usize == i).is_some() {
                 let force = if self.is_alpha() { self.alpha_pin_force(i) } else { -self.current.r[i] };
-                force.dot(&moved)
+                (force - self.limit_force(i)).dot(&moved)
             } else {
                 (self.fall[i] * *m + self.contact_force[i]).dot(&moved)
             };

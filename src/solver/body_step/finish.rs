@@ -143,6 +143,8 @@ impl BodyProblem {
     pub fn pin_force(&self, node: u32, share: &Vec3) -> Vec3 {
         let Ok(k) = self.key.pins.binary_search(&node) else { return Vec3::zeros() };
         let node = node as usize;
+        // What limits pull at a pin is not in the residual of the step.
+        let share = share + self.limit_force(node);
         if self.is_alpha() {
             return self.alpha_pin_force(node) - share;
         }

@@ -7,6 +7,7 @@ mod cavities;
 mod energy_bound;
 mod finish;
 mod generalized_alpha;
+mod hard_limits;
 mod initial_guess;
 mod newton_factors;
 mod rigid_fallback;

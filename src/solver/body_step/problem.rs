@@ -8,7 +8,7 @@ use super::cavities::FilledCavity;
 use super::generalized_alpha::{ALPHA_F, AlphaStart};
 use crate::body::{Impact, PrescribedNode, SolverSettings};
 use crate::fem::elastic_forces::Evaluation;
-use crate::fem::{Dampers, DeformableModel, Elements, StiffnessDamping, elastic_forces};
+use crate::fem::{Dampers, DeformableModel, Elements, HardLimiting, StiffnessDamping, elastic_forces};
 use crate::material::DeformableMaterial;
 use crate::math::{
     Mat3, Vec3, centre_of_mass, inertia_about, rotation_from_vector, skew, solve_without_small,
@@ -89,6 +89,7 @@ pub(crate) struct BodyProblem {
     /// What the last contact problem added to them \[N\].
     pub contact_change: Vec<Vec3>,
     pub preconditioner: Preconditioner,
+    pub limiting: HardLimiting,
     /// Factor c ≥ 1 on A, raised by the guard.
     pub step_damping: f64,
     pub guard_retries: usize,

@@ -29,6 +29,8 @@ mod improve;
 
 mod paths;
 
+mod holds;
+
 mod with_matrix;
 
 mod without_matrix;

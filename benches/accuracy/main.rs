@@ -1,7 +1,12 @@
-//! Error against time of the settings of a body that bends: `cargo bench --bench accuracy`.
+//! Error against time of the settings of a body that bends: `cargo bench --bench accuracy`; `-- rest` compares rest that is found
+//! with rest that is waited for.
 //!
 //! A slender cantilever (1 × 0.1 × 0.1 m, 400 tets) falls under its own weight for 1.5 s. Error: the
 //! largest distance of its tip's height from that of the same steps solved to 1e-9. One thread.
+
+#[path = "../shared/clock.rs"]
+mod clock;
+mod rest;
 
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
@@ -36,6 +41,9 @@ fn run(e: f64, nu: f64, settings: SolverSettings) -> (Vec<f64>, f64) {
 }
 
 fn main() {
+    if std::env::args().any(|argument| argument == "rest") {
+        return rest::compare();
+    }
     let plain = |iterations| SolverSettings::iterations(iterations).acceleration(Acceleration::None);
     let lbfgs = SolverSettings::iterations;
     let laplacian = |iterations| SolverSettings::iterations(iterations).system(SystemMatrix::Laplacian);
