@@ -1,5 +1,8 @@
 //! OBJ, STL, PLY and glTF files, written here and read back; damaged ones answer with an error.
 
+#[path = "common/surfaces.rs"]
+mod surfaces;
+
 use foible3d::prelude::*;
 use proptest::prelude::*;
 use rapier3d::prelude::*;
@@ -126,6 +129,29 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
         ("glb", glb(&mesh)),
         ("gltf", gltf(&mesh)),
     ]
+}
+
+/// Welded, sound, and filled: its creases are kept, its holes stay round.
+#[test]
+fn a_bracket_from_an_stl_file_is_filled() {
+    let (vertices, triangles) = surfaces::bracket();
+    let round = 0.5 * 32.0 * 0.15f64.powi(2) * (std::f64::consts::TAU / 32.0).sin();
+    let volume = (0.2 + 0.2 * 0.6) * 0.6 - 2.0 * 0.2 * round;
+    let read = SurfaceMesh::read_bytes("stl", &stl_binary(&SurfaceMesh { vertices, triangles })).unwrap();
+    let (read, _) = read.repaired(&SurfaceRepair::default()).unwrap();
+    assert!(read.report().is_sound(), "{:?}", read.report());
+    assert!((read.report().volume / volume - 1.0).abs() < 1e-6);
+    for (cell, bound) in [(0.1, 0.01), (0.05, 0.0025)] {
+        let mesh = read.filled(cell).unwrap();
+        let off = mesh.volume() / volume - 1.0;
+        let angles = mesh.dihedral_angles().fold([180.0, 0.0f64], |[l, m], a| [a.min(l), m.max(a)]);
+        println!(
+            "cells of {cell} m: {} tetrahedra, volume {off:+.1e}, {angles:.1?}°",
+            mesh.tetrahedra().len()
+        );
+        assert!(off.abs() < bound, "{off:e}");
+        assert!(angles[0] > 10.0 && angles[1] < 160.0, "{angles:?}");
+    }
 }
 
 #[test]

@@ -7,14 +7,14 @@ use std::path::Path;
 
 /// Of a bar \[°\].
 const WIDTH: usize = 5;
-const SIZE: (u32, u32) = (920, 520);
+const SIZE: (u32, u32) = (1220, 520);
 const BLUE: RGBColor = RGBColor(0, 114, 178);
 
 /// One panel for each mesh.
 pub fn draw(meshes: &[Filled], path: &Path) -> Result<(), Box<dyn Error>> {
     let root = SVGBackend::new(path, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
-    for (panel, filled) in root.split_evenly((2, 3)).iter().zip(meshes) {
+    for (panel, filled) in root.split_evenly((2, 4)).iter().zip(meshes) {
         let mut parts = [0.0; 180 / WIDTH];
         let each = 100.0 / (6 * filled.mesh.tetrahedra().len()) as f64;
         filled.mesh.dihedral_angles().for_each(|a| parts[(a as usize / WIDTH).min(180 / WIDTH - 1)] += each);
