@@ -63,9 +63,10 @@ impl Lattice {
                 for i in 0..n[0] {
                     let here = [i, j, k];
                     for axis in (0..3).filter(|&axis| here[axis] + 1 < n[axis]) {
-                        let step = |mut at: [usize; 3], axis: usize| {
-                            at[axis] += 1;
-                            at
+                        // Not by `at[axis] += 1` on a parameter: rustc 1.95 with `opt-level = 1` changes the caller's then, and
+                        // what is filled falls apart.
+                        let step = |at: [usize; 3], axis: usize| -> [usize; 3] {
+                            std::array::from_fn(|k| at[k] + usize::from(k == axis))
                         };
                         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
                         let first = step(here, axis);
