@@ -114,7 +114,8 @@ pub use export::{GltfRecording, SurfaceSequence, VtkSeries};
 pub use fem::{DeformableCavity, DeformableModel, SystemMatrix};
 pub use material::{DeformableMaterial, MaterialError, MaxwellBranch, OrthotropicSheet};
 pub use mesh::{
-    MeshError, Structure, SurfaceFault, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, TetMesh,
+    MeshError, Structure, SurfaceFault, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport,
+    SurfaceWrapped, TetMesh,
 };
 pub use pipeline::{
     DeformableChannelEventCollector, DeformableCollisionEvent, DeformableContactForceEvent,

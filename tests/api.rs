@@ -2,7 +2,7 @@
 use foible3d::prelude::*;
 use foible3d::{
     BodyError, DeformableState, HandleError, MaterialError, MeshError, SurfaceFault, SurfaceRepaired,
-    SurfaceReport,
+    SurfaceReport, SurfaceWrapped,
 };
 use std::fmt::Debug;
 
@@ -27,7 +27,7 @@ promises! {
         Acceleration, FactorPrecision, Fidelity, Elasticity, CavityFilling, Actuator, ActuatorSignal, DeformableActuators, JointMotorAxis, foible3d::ActuatorError, CablePoint, ContactWrench, DepthCamera, TactilePad, TactileReading, DeformableCable, DeformableCableBuilder, DeformableCableHandle, foible3d::DeformableCavity, DeformableBodyHandle, DeformableAttachment,
         DeformableAttachmentHandle, AttachTo, DeformableContact, DeformablePairContact, RigidContact, JointForce,
         JointRole, SolvedJoint, DeformableSurfacePoint, DeformableBodyError, BodyError, HandleError, MaterialError,
-        MeshError, DeformableContactPartner, DeformableWind, DeformableRest, DeformableMode, DeformableTape, DeformableLoss, DeformableGradient, MaterialGradient, StepGradient, MaxwellBranch, OrthotropicSheet, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceFault, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableDrag, DeformableCollisionEvent,
+        MeshError, DeformableContactPartner, DeformableWind, DeformableRest, DeformableMode, DeformableTape, DeformableLoss, DeformableGradient, MaterialGradient, StepGradient, MaxwellBranch, OrthotropicSheet, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceWrapped, SurfaceFault, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableDrag, DeformableCollisionEvent,
         DeformableContactForceEvent, DeformableChannelEventCollector, DeformableSolverContact,
         DeformablePairFilterContext<'static>, DeformableContactModificationContext<'static>;
     is_printed: DeformableDrag, DeformableColliders, DeformableSkin, DeformableSurfaceMesh, DeformableChannelEventCollector, DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody, DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh, Structure, DeformableAttachment, DeformableCable, DeformableCableBuilder, DeformableActuators, foible3d::ActuatorError, DepthCamera, TactilePad, TactileReading, DeformableTape, DeformableLoss, DeformableGradient, MaterialGradient, StepGradient;

@@ -153,8 +153,9 @@ fn libraries_are_named_only_where_they_belong() {
     for (name, text) in files() {
         let names = |what: &str| code_lines(&text).any(|l| l.contains(what));
         assert!(!names("faer") || name == "solver/linear/factor.rs", "{name} names faer");
-        // A fill asks for the surface it fills.
-        let queries = name.starts_with("contact/") || name == "mesh/fill/domain.rs";
+        // A fill asks for the surface it fills, a wrap for the one it is around.
+        let of_surfaces = ["mesh/fill/domain.rs", "mesh/repair/wrap.rs", "mesh/repair/facing.rs"];
+        let queries = name.starts_with("contact/") || of_surfaces.contains(&name.as_str());
         assert!(!names("parry3d::query") || queries, "{name} names parry's queries");
         assert!(!names("Instant") || name == "profiler.rs", "{name} reads the clock");
         for set in ["RigidBodySet", "ColliderSet", "MultibodyJointSet"] {

@@ -1,6 +1,6 @@
 //! Closed rooms of a body: hollows within its tetrahedra, and what its sheets close in.
 
-use crate::math::Vec3;
+use crate::math::{Vec3, solid_angle};
 use crate::mesh::{NONE, Surface};
 use std::collections::HashMap;
 
@@ -42,15 +42,9 @@ impl Cavity {
         volume(&self.triangles, x)
     }
 
-    /// Whether a place is within the room at rest: its walls cover the whole sphere of directions there, by the solid angles of
-    /// triangles [Van Oosterom & Strackee 1983].
+    /// Whether a place is within the room at rest: its walls cover the whole sphere of directions there.
     pub fn holds(&self, place: &Vec3, rest: &[Vec3]) -> bool {
-        let angle = |nodes: &[u32; 3]| {
-            let [a, b, c] = nodes.map(|n| rest[n as usize] - place);
-            let [p, q, r] = [a, b, c].map(|v| v.norm());
-            let below = p * q * r + a.dot(&b) * r + b.dot(&c) * p + c.dot(&a) * q;
-            2.0 * a.dot(&b.cross(&c)).atan2(below)
-        };
+        let angle = |nodes: &[u32; 3]| solid_angle(&nodes.map(|n| rest[n as usize]), place);
         self.triangles.iter().map(angle).sum::<f64>() > 2.0 * std::f64::consts::PI
     }
 

@@ -13,6 +13,8 @@ pub(crate) mod lanes;
 pub(crate) mod polar;
 mod rigid_motion;
 pub(crate) use rigid_motion::RigidMotion;
+mod solid_angle;
+pub(crate) use solid_angle::solid_angle;
 
 use rapier3d::math::Vector;
 

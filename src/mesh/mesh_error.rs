@@ -202,6 +202,18 @@ pub enum MeshError {
         /// What the cells fill of it \[m³\].
         filled: f64,
     },
+    /// A wrap leaves parts of the surface outside.
+    #[error(
+        "{lost:e} m² of {area:e} m² enclose nothing at a cell size of {cell_size} m: they are sheets, or thinner than a cell"
+    )]
+    NotWrapped {
+        /// Requested cell size \[m\].
+        cell_size: f32,
+        /// Area of all triangles \[m²\].
+        area: f64,
+        /// Area of those that are more than a cell from the wrap and outside of it \[m²\].
+        lost: f64,
+    },
     /// A surface with borders, or with neighbouring triangles that are not wound alike.
     #[error("the surface does not close: {edges} edges have no neighbour wound alike, the first at {at:?} m")]
     OpenSurface {

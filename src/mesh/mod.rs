@@ -18,7 +18,7 @@ mod warp;
 
 pub use mesh_error::MeshError;
 pub(crate) use ordering::{node_adjacency, sweep_order};
-pub use repair::{SurfaceFault, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport};
+pub use repair::{SurfaceFault, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceWrapped};
 pub(crate) use structure::Rod;
 pub use structure::Structure;
 pub(crate) use surface::{NONE, Surface, point_normals, sorted_face, sorted_faces};

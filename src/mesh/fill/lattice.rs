@@ -4,7 +4,7 @@ use crate::math::Vec3;
 
 /// Cubes of side `a` with a vertex at each corner and each centre. Tetrahedra stand on two neighbouring centres and
 /// an edge of the face between them: all are alike, with dihedral angles of 60° and 90°.
-pub(super) struct Lattice {
+pub(in crate::mesh) struct Lattice {
     /// Side of a cube \[m\].
     pub a: f64,
     /// Cubes per axis.

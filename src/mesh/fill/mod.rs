@@ -17,7 +17,7 @@ use super::mesh_error::MeshError;
 use super::tet_mesh::TetMesh;
 use domain::Domain;
 use draft::Draft;
-use lattice::Lattice;
+pub(super) use lattice::Lattice;
 use parry3d::math::Vector;
 use parry3d::shape::{Ball, Shape, SupportMap, TriMesh, TypedShape};
 use parry3d::transformation::convex_hull;
@@ -26,9 +26,9 @@ use surface_check::{check_sizes, check_vertices};
 
 /// Side of the lattice's cubes, in cells: the long edges. The short ones are 0.62 cells. With it a ball of eight cells
 /// across has 99.2 % of its volume, with 0.77 98.95 %.
-const CUBE: f64 = 0.72;
+pub(super) const CUBE: f64 = 0.72;
 /// Most cubes of a lattice: 12 million tetrahedra, beyond what a step could carry.
-const MOST_CUBES: f64 = 1048576.0;
+pub(super) const MOST_CUBES: f64 = 1048576.0;
 /// Part of the enclosed volume by which a filling may differ; else cells are halved. A ball needs three cells across.
 const OFF: f64 = 0.1;
 /// How often cells are halved at the most: each time makes eight times as many.

@@ -1,12 +1,17 @@
 //! Triangle surfaces as people have them: what is wrong with one, and its repair.
 
 mod crossings;
+mod facing;
 mod holes;
+mod marching;
 mod orientation;
 mod report;
 mod weld;
+mod winding;
+mod wrap;
 
 pub use report::{SurfaceFault, SurfaceReport};
+pub use wrap::SurfaceWrapped;
 
 use super::fill::{check_closed, signed_volume_of};
 use super::mesh_error::MeshError;
