@@ -173,7 +173,7 @@ fn damaged(random: &mut Random, case: usize) -> SurfaceMesh {
     // Every triangle with corners of its own, as STL has them.
     let soup = given.triangles.iter().flatten().map(|v| given.vertices[*v as usize]).collect();
     let triangles = (0..given.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    if case % 2 == 0 { given } else { SurfaceMesh { vertices: soup, triangles } }
+    if case.is_multiple_of(2) { given } else { SurfaceMesh { vertices: soup, triangles } }
 }
 
 #[test]
