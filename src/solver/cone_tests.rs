@@ -10,10 +10,10 @@ use crate::contact::Law;
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
-/// 1e-12 is what rounding leaves of forces that come of gaps over R = 1e-4 W.
-const TOLERANCE: ConeTolerance = ConeTolerance { relative: 1e-11, floor: 1e-6 };
+/// 5e-12 is what rounding leaves of forces that come of gaps over R = 2e-5 W; at 1e-11 one of 4000 random problems is not reached.
+const TOLERANCE: ConeTolerance = ConeTolerance { relative: 5e-11, floor: 1e-6 };
 /// Proximal parameter of a solve.
-const EPSILON: f64 = 1e-4;
+const EPSILON: f64 = 2e-5;
 
 /// Numbers of a linear congruence [Knuth].
 struct Numbers(u64);
