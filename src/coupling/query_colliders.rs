@@ -162,7 +162,11 @@ fn made(body: &DeformableBody) -> Option<ColliderBuilder> {
 fn refit(collider: &mut Collider, body: &DeformableBody) {
     let shape = collider.shape_mut();
     if let Some(mesh) = shape.as_trimesh_mut() {
-        mesh.set_vertices(&vertices(body));
+        let vertices = vertices(body);
+        // A saved world may have put another body into the place of the one that it was made for.
+        if mesh.vertices().len() == vertices.len() {
+            mesh.set_vertices(&vertices);
+        }
     } else if let Some(line) = shape.as_polyline_mut() {
         let ends = line.indices().to_vec();
         *line = Polyline::new(vertices(body), Some(ends));

@@ -83,7 +83,7 @@ fn solved_contacts_obey_signorini_and_coulomb() {
     let mut carrying = 0;
     for (contact, result) in contacts.active.iter().zip(contacts.results()) {
         let (l, gap) = (&contacts.lambda[contact.rows()], result.gap);
-        // Lengths are of 1e-3 m over a step; the regularisation (ε = 2e-5) and the lagging shift of
+        // Lengths are of 1e-3 m over a step; the regularisation (ε = 1e-4) and the lagging shift of
         // slipping contacts leave less than 1e-4 of that.
         assert!(
             gap > -1e-7 && l[0] >= 0.0 && l[1].hypot(l[2]) <= 0.4 * l[0] * (1.0 + 1e-9),

@@ -315,6 +315,7 @@ pub(super) fn random_problem(contacts: usize, rank: usize, mu: f64, numbers: &[f
         groups: vec![0, contacts],
         filled: vec![(0, 0)],
         g: g.as_slice().to_vec(),
+        mass_ratio: 0.0,
     }
 }
 

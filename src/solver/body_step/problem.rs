@@ -78,7 +78,7 @@ pub(crate) struct BodyProblem {
     pub(super) spin: Vec3,
     /// Where the nodes would go without internal and contact forces.
     pub target: Vec<Vec3>,
-    pub(super) masses: Vec<f64>,
+    pub masses: Vec<f64>,
     pub(super) damping: StiffnessDamping,
     /// Those that have not ended.
     pub impacts: Vec<Impact>,

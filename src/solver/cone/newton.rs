@@ -10,16 +10,11 @@
 //! the segment of a force-limited constraint it is not. Only f′ along a direction is ever evaluated. See `docs/method.md`.
 
 use super::hessian::ConeHessian;
-use super::problem::{ConeProblem, ConeTolerance, ConeWork, dot, largest, spatial};
+use super::problem::{ConeProblem, ConeTolerance, ConeWork, EPSILON, dot, largest, spatial};
 use super::projection;
 use super::secant;
 use crate::contact::Law;
 
-/// Proximal parameter of the result. What forces change by in a solve leaves a gap of ε·W per newton, and W has the way that the
-/// lightest body would be thrown. At 1e-4 that was as much as 1e9 Pa yields: between a light box and one 10 000 times as heavy
-/// contacts trembled at 0.1 m/s, 0.2 mm deep. From 1e-5 to 1e-7 they stand; at 1e-8 Newton's method fails at times (rounding of W's
-/// factor), and at 1e-5 forces of a cube squeezed between boxes differ by 1.3e-6, not 2e-9, in one case.
-const EPSILON: f64 = 2.0e-5;
 /// Error from which on Newton's method converges fast.
 const NEARLY: f64 = 1.0e-2;
 /// Newton steps that a warm start may take before continuation begins.
@@ -82,7 +77,7 @@ impl ConeSolver {
         shift: impl Fn(usize) -> f64,
         end: impl Fn(usize) -> f64,
     ) {
-        self.set_regularisation(problem, EPSILON);
+        self.set_regularisation(problem, problem.epsilon());
         self.predicted.clear();
         self.predicted.extend_from_slice(lambda);
         for (i, law) in problem.laws.iter().enumerate() {
@@ -117,6 +112,9 @@ impl ConeSolver {
             // Not a bit of it changes, so nothing has to be done again.
             return work;
         }
+        let last = problem.epsilon();
+        // The stages' own last one is that of the result.
+        let stage = |epsilon: f64, steps: usize| (if epsilon == EPSILON { last } else { epsilon }, steps);
         let mut continuation = |solver: &mut Self, stages: &[(f64, usize)]| {
             solver.z.clear();
             solver.z.extend_from_slice(lambda);
@@ -125,7 +123,7 @@ impl ConeSolver {
             solver.Wz.clone_from(W_lambda);
             stages.iter().all(|&(epsilon, steps)| {
                 // What is only a start for the next stage need not be more exact than that.
-                let relative = if epsilon > EPSILON { STAGE_TOLERANCE } else { tolerance.relative };
+                let relative = if epsilon > last { STAGE_TOLERANCE } else { tolerance.relative };
                 let tolerance = ConeTolerance { relative: relative.max(tolerance.relative), ..tolerance };
                 let done = solver.minimise(problem, epsilon, steps, tolerance, &mut work);
                 work.error = solver.error(&solver.z, tolerance);
@@ -135,9 +133,9 @@ impl ConeSolver {
             })
         };
         let steps = if effort == Effort::Near { NEAR_STEPS } else { STAGE_STEPS };
-        let done = continuation(self, &[(EPSILON, WARM_STEPS)])
-            || effort != Effort::Warm && continuation(self, &STAGES.map(|e| (e, steps)))
-            || effort == Effort::Full && continuation(self, &FINE_STAGES.map(|e| (e, steps)));
+        let done = continuation(self, &[(last, WARM_STEPS)])
+            || effort != Effort::Warm && continuation(self, &STAGES.map(|e| stage(e, steps)))
+            || effort == Effort::Full && continuation(self, &FINE_STAGES.map(|e| stage(e, steps)));
         if !done {
             work.failures += 1;
             if effort != Effort::Full || self.gamma.iter().any(|g| !g.is_finite()) {
@@ -171,7 +169,7 @@ impl ConeSolver {
         W_lambda: &[f64],
         tolerance: ConeTolerance,
     ) -> bool {
-        self.set_regularisation(problem, EPSILON);
+        self.set_regularisation(problem, problem.epsilon());
         self.center.clear();
         self.center.extend_from_slice(lambda);
         self.Wz.clear();

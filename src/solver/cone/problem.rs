@@ -19,7 +19,19 @@ pub(crate) struct ConeProblem {
     pub version: u64,
     /// Gaps and slips without contact forces \[m\], the shift included in the normal ones.
     pub g: Vec<f64>,
+    /// Mass of the heaviest of what is touched over that of the lightest; zero if nothing is told of them.
+    pub mass_ratio: f64,
 }
+
+/// Proximal parameter of the result, where masses are alike: ε·W is what a solve yields by for every newton that forces change by, and
+/// W has the way that the lightest body would be thrown.
+pub(super) const EPSILON: f64 = 1.0e-4;
+/// Ratio of masses from which on the proximal term gets smaller with them. At 1:10 000 as much as alike masses have is what 1e9 Pa yield:
+/// between a light box and a heavy one contacts trembled at 0.1 m/s, 0.2 mm deep. From 0.1 to 0.001 of it such stacks stand; at 1e-4
+/// Newton's method fails at times, by the rounding of W's factor.
+const UNLIKE: f64 = 2.0e3;
+/// The least part of it.
+const LEAST: f64 = 0.1;
 
 /// How hard to try.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +55,11 @@ pub(crate) struct ConeWork {
 impl ConeProblem {
     pub fn rows(&self) -> usize {
         self.offsets.last().copied().unwrap_or(0)
+    }
+
+    /// Proximal parameter of its solution.
+    pub fn epsilon(&self) -> f64 {
+        EPSILON * (UNLIKE / self.mass_ratio).clamp(LEAST, 1.0)
     }
 
     pub fn contacts(&self) -> usize {

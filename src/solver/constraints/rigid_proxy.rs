@@ -126,6 +126,14 @@ impl RigidProxies {
         self.get(id).yields()
     }
 
+    /// Mass \[kg\] of what moves by itself, along its lightest axis.
+    pub fn mass(&self, id: ProxyId) -> Option<f64> {
+        match self.get(id) {
+            RigidProxy::Rigid { inv_mass, .. } if inv_mass.max() > 0.0 => Some(1.0 / inv_mass.max()),
+            _ => None,
+        }
+    }
+
     /// What yields with this proxy: itself, or the first link of its articulation.
     pub fn group(&self, id: ProxyId) -> ProxyId {
         match self.get(id) {

@@ -4,6 +4,7 @@ use super::delassus::ContactRows;
 use super::gaps::end;
 use super::improve::Around;
 use super::system::{Change, ContactSystem};
+use crate::contact::Endpoint;
 use crate::solver::body_step::{BodyProblem, are_large};
 use crate::solver::cone::{ConeTolerance, Effort};
 use crate::threads::for_each_item;
@@ -39,11 +40,25 @@ impl ContactSystem {
                 dense.problem.version += 1;
                 self.fill_path_columns(bodies, around);
             }
+            self.dense.problem.mass_ratio = self.mass_ratio(bodies, context);
         }
         self.dense.problem.multiply(&self.lambda, &mut self.dense.slips);
         if matches!(change, Change::Contacts | Change::Forces) {
             self.predict(bodies, context);
         }
+    }
+
+    /// Mass of the heaviest of what is touched over that of the lightest.
+    fn mass_ratio(&self, bodies: &[BodyProblem], context: &super::SolveContext<'_>) -> f64 {
+        let mass = |endpoint: &Endpoint| match endpoint {
+            Endpoint::Soft { body, .. } => Some(bodies[*body].masses.iter().sum()),
+            _ => endpoint.proxy().and_then(|proxy| context.proxies.mass(proxy)),
+        };
+        let endpoints = self.active.iter().flat_map(|contact| contact.constraint.all_endpoints());
+        let (least, most) = endpoints
+            .filter_map(mass)
+            .fold((f64::INFINITY, 0.0f64), |(least, most), m: f64| (least.min(m), most.max(m)));
+        most / least
     }
 
     /// Lets Newton's method begin where the last forces and slips were, and where the bodies' trial positions are.
