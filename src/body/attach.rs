@@ -76,7 +76,7 @@ impl DeformableBodySet {
         let mut nodes = Vec::with_capacity(vertices.len());
         for &vertex in vertices {
             let node = body.node(vertex)?;
-            if body.model.surface.index_of_node[node] == u32::MAX {
+            if !body.model.surface.has_node(node) {
                 return Err(BodyError::NotOnSurface { vertex }.into());
             }
             nodes.push(node as u32);

@@ -236,10 +236,7 @@ impl DeformableBodySet {
     /// Whether bodies and nodes of an attachment are there, on their surfaces.
     fn fits(&self, attachment: &DeformableAttachment) -> bool {
         let has = |body: DeformableBodyHandle, nodes: &[u32]| {
-            self.get(body).is_some_and(|body| {
-                let place = |n: &u32| body.model.surface.index_of_node.get(*n as usize);
-                nodes.iter().all(|n| place(n).is_some_and(|place| *place != u32::MAX))
-            })
+            self.get(body).is_some_and(|body| nodes.iter().all(|n| body.model.surface.has_node(*n as usize)))
         };
         let count = attachment.nodes.len();
         has(attachment.body, &attachment.nodes)

@@ -123,7 +123,7 @@ impl Part {
         let surface = &own.model.surface;
         let around = own.model.tetrahedra.iter().filter(|tet| tet.iter().all(|&n| other.holds(n)));
         let around: Vec<_> = around.map(|tet| tet.map(|n| own.x[n as usize])).collect();
-        let of_surface = |n: &&u32| surface.index_of_node[**n as usize] != u32::MAX;
+        let of_surface = |n: &&u32| surface.has_node(**n as usize);
         self.nodes.iter().filter(of_surface).map(|&n| own.x[n as usize]).any(|p| {
             around.iter().any(|tet| tetrahedron_holds(tet, &p))
                 && (0..surface.triangles.len() as u32)

@@ -89,6 +89,11 @@ impl Surface {
         surface
     }
 
+    /// Whether a node is there, and on the surface.
+    pub fn has_node(&self, node: usize) -> bool {
+        self.index_of_node.get(node).is_some_and(|index| *index != u32::MAX)
+    }
+
     /// Finds a facet of every node, and which nodes no solid has.
     fn describe_nodes(&mut self) {
         let index = |n: u32| self.index_of_node[n as usize] as usize;

@@ -15,6 +15,7 @@ mod surface_check;
 
 use super::mesh_error::MeshError;
 use super::tet_mesh::TetMesh;
+use crate::math::Vec3;
 use domain::Domain;
 use draft::Draft;
 pub(super) use lattice::Lattice;
@@ -26,9 +27,9 @@ use surface_check::{check_sizes, check_vertices};
 
 /// Side of the lattice's cubes, in cells: the long edges. The short ones are 0.62 cells. With it a ball of eight cells
 /// across has 99.2 % of its volume, with 0.77 98.95 %.
-pub(super) const CUBE: f64 = 0.72;
+const CUBE: f64 = 0.72;
 /// Most cubes of a lattice: 12 million tetrahedra, beyond what a step could carry.
-pub(super) const MOST_CUBES: f64 = 1048576.0;
+const MOST_CUBES: f64 = 1048576.0;
 /// Part of the enclosed volume by which a filling may differ; else cells are halved. A ball needs three cells across.
 const OFF: f64 = 0.1;
 /// How often cells are halved at the most: each time makes eight times as many.
@@ -125,22 +126,28 @@ fn lattice_of(half_extents: [f32; 3], cell_size: f32) -> Result<TetMesh, MeshErr
     TetMesh::cuboid(half_extents.map(f64::from), cells.map(|c| c as usize))
 }
 
+/// The lattice of cells of this size \[m\] over a box; an error if those are too many, or none.
+pub(super) fn lattice_over(low: Vec3, high: Vec3, cell_size: f32) -> Result<Lattice, MeshError> {
+    let (cube, extents) = (CUBE * f64::from(cell_size), high - low);
+    let cubes: f64 = extents.iter().map(|e| (e / cube).ceil() + 2.0).product();
+    if !(cube > 0.0 && cubes <= MOST_CUBES) {
+        let extents = [extents.x, extents.y, extents.z].map(|e| e as f32);
+        return Err(MeshError::BadCellSize { cell_size, extents });
+    }
+    Ok(Lattice::over(low, high, cube))
+}
+
 /// Fills with cells of this size, or smaller ones where they hold too little or too much.
 fn fill(domain: &Domain, cell_size: f32) -> Result<TetMesh, MeshError> {
-    let extents = domain.high - domain.low;
     let (mut filled, mut tried) = (0.0, cell_size);
     for halving in 0..=HALVINGS {
         let size = cell_size / (1 << halving) as f32;
-        let cube = CUBE * f64::from(size);
-        let cubes: f64 = extents.iter().map(|e| (e / cube).ceil() + 2.0).product();
-        if !(cube > 0.0 && cubes <= MOST_CUBES) {
-            if halving > 0 {
-                break;
-            }
-            let extents = [extents.x, extents.y, extents.z].map(|e| e as f32);
-            return Err(MeshError::BadCellSize { cell_size, extents });
-        }
-        let lattice = Lattice::over(domain.low, domain.high, cube);
+        let lattice = match lattice_over(domain.low, domain.high, size) {
+            Ok(lattice) => lattice,
+            Err(_) if halving > 0 => break,
+            Err(error) => return Err(error),
+        };
+        let cube = lattice.a;
         let (is_inside, overlaps) = domain.inside(&lattice);
         let mut draft = Draft::new(stuffing::stuff(domain, &lattice, &is_inside), domain);
         snapping::snap_to_creases(&mut draft, domain, cube);

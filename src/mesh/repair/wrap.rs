@@ -8,7 +8,7 @@ use super::orientation::wind_alike;
 use super::winding::Winding;
 use crate::math::{Vec3, from_real, to_real};
 use crate::mesh::MeshError;
-use crate::mesh::fill::{CUBE, Lattice, MOST_CUBES, check_closed};
+use crate::mesh::fill::{Lattice, check_closed, lattice_over};
 use crate::mesh::sorted_face;
 use parry3d::query::{PointQuery, Ray, RayCast};
 use parry3d::shape::TriMesh;
@@ -97,13 +97,7 @@ impl SurfaceMesh {
         let all = || self.vertices.iter().map(|v| from_real(*v));
         let start = all().next().unwrap_or_default();
         let (low, high) = all().fold((start, start), |(low, high), v| (low.inf(&v), high.sup(&v)));
-        let (cube, extents) = (CUBE * f64::from(cell_size), high - low);
-        let cubes: f64 = extents.iter().map(|e| (e / cube).ceil() + 2.0).product();
-        if !(cube > 0.0 && cubes <= MOST_CUBES) {
-            let extents = [extents.x, extents.y, extents.z].map(|e| e as f32);
-            return Err(MeshError::BadCellSize { cell_size, extents });
-        }
-        Ok(Lattice::over(low, high, cube))
+        lattice_over(low, high, cell_size)
     }
 
     /// Areas of all triangles, and of those that are more than a cell from the wrap and outside of it \[m²\].

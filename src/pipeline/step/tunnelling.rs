@@ -74,7 +74,7 @@ impl TunnellingStops {
         let surface = &problem.model.surface;
         let edge = surface.mean_edge;
         for (node, (from, to)) in problem.x_start.iter().zip(&self.x).enumerate() {
-            let is_inner = surface.index_of_node[node] == u32::MAX;
+            let is_inner = !surface.has_node(node);
             let listed = |nodes: &[u32]| nodes.binary_search(&(node as u32)).is_ok();
             let has_contact = !is_inner && listed(&self.touching);
             if has_contact || !comes_near(&swept, from, to) || listed(&problem.key.pins) {
