@@ -49,6 +49,7 @@ impl BodyProblem {
             is_rejected: false,
             was_redone: false,
             weight: 0.0,
+            total_mass: 0.0,
             step: vec![Vec3::zeros(); n],
             force: Vec::new(),
             frame: Mat3::identity(),
@@ -122,8 +123,8 @@ impl BodyProblem {
         let elements = body.elements();
         self.damping.take_dampers(&elements, &body.state.dampers);
         self.damping.begin(&elements, self.damping_step(), &body.state.x, before);
-        let mass = self.masses.iter().sum::<f64>();
-        self.weight = mass * (gravity * body.gravity_scale()).norm() / n as f64;
+        self.total_mass = self.masses.iter().sum();
+        self.weight = self.total_mass * (gravity * body.gravity_scale()).norm() / n as f64;
     }
 
     fn read_state(&mut self, body: &DeformableBody) {

@@ -131,7 +131,7 @@ impl BodyProblem {
         let mut v = std::mem::take(&mut self.force);
         let rigid = self.rigid_energy(&mut v);
         self.force = v;
-        let mass = self.masses.iter().sum::<f64>();
+        let mass = self.total_mass;
         let falls = self.weight * self.masses.len() as f64 / mass * self.dt;
         let may_give = MAX_GIVEN_BACK * (start + mass * falls * falls);
         // Written so that NaN counts as much.

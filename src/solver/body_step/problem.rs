@@ -78,7 +78,7 @@ pub(crate) struct BodyProblem {
     pub(super) spin: Vec3,
     /// Where the nodes would go without internal and contact forces.
     pub target: Vec<Vec3>,
-    pub masses: Vec<f64>,
+    pub(super) masses: Vec<f64>,
     pub(super) damping: StiffnessDamping,
     /// Those that have not ended.
     pub impacts: Vec<Impact>,
@@ -99,6 +99,8 @@ pub(crate) struct BodyProblem {
     pub was_redone: bool,
     /// A force that counts as large for this body \[N\].
     pub weight: f64,
+    /// \[kg\]
+    pub total_mass: f64,
     pub(super) step: Vec<Vec3>,
     pub(super) force: Vec<Vec3>,
     /// The body's frame at the start of the iteration.

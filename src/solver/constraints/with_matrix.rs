@@ -51,7 +51,7 @@ impl ContactSystem {
     /// Mass of the heaviest of what is touched over that of the lightest.
     fn mass_ratio(&self, bodies: &[BodyProblem], context: &super::SolveContext<'_>) -> f64 {
         let mass = |endpoint: &Endpoint| match endpoint {
-            Endpoint::Soft { body, .. } => Some(bodies[*body].masses.iter().sum()),
+            Endpoint::Soft { body, .. } => Some(bodies[*body].total_mass),
             _ => endpoint.proxy().and_then(|proxy| context.proxies.mass(proxy)),
         };
         let endpoints = self.active.iter().flat_map(|contact| contact.constraint.all_endpoints());
