@@ -141,7 +141,7 @@ fn a_bracket_from_an_stl_file_is_filled() {
     let (read, _) = read.repaired(&SurfaceRepair::default()).unwrap();
     assert!(read.report().is_sound(), "{:?}", read.report());
     assert!((read.report().volume / volume - 1.0).abs() < 1e-6);
-    for (cell, bound) in [(0.1, 0.01), (0.05, 0.0024)] {
+    for (cell, bound) in [(0.1, 0.0095), (0.05, 0.0024)] {
         let mesh = read.filled(cell).unwrap();
         let off = mesh.volume() / volume - 1.0;
         let angles = mesh.dihedral_angles().fold([180.0, 0.0f64], |[l, m], a| [a.min(l), m.max(a)]);

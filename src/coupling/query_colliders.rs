@@ -111,12 +111,13 @@ impl DeformableColliders {
         colliders: &mut ColliderSet,
     ) -> Vec<ColliderHandle> {
         let mut gone = Vec::new();
-        self.of_body.retain(|body, collider| {
-            let stays = deformables.contains(*body) && colliders.contains(*collider);
-            if !stays {
+        self.of_body.retain(|body, collider| match (deformables.get(*body), colliders.get(*collider)) {
+            // A damaged world may call another's its own.
+            (Some(body), Some(collider)) => fits(collider, body),
+            _ => {
                 gone.push(*collider);
+                false
             }
-            stays
         });
         for (handle, body) in deformables.iter() {
             let known = self.of_body.get(&handle).copied();
@@ -159,14 +160,18 @@ fn made(body: &DeformableBody) -> Option<ColliderBuilder> {
     Some(collider.enabled(body.is_enabled()).user_data(body.user_data))
 }
 
+/// Whether a collider can have been made for a body.
+fn fits(collider: &Collider, body: &DeformableBody) -> bool {
+    let shape = collider.shape();
+    let of_mesh = shape.as_trimesh().map(|mesh| mesh.vertices().len());
+    let vertices = of_mesh.or_else(|| shape.as_polyline().map(|line| line.vertices().len()));
+    vertices == Some(body.state.x.len())
+}
+
 fn refit(collider: &mut Collider, body: &DeformableBody) {
     let shape = collider.shape_mut();
     if let Some(mesh) = shape.as_trimesh_mut() {
-        let vertices = vertices(body);
-        // A saved world may have put another body into the place of the one that it was made for.
-        if mesh.vertices().len() == vertices.len() {
-            mesh.set_vertices(&vertices);
-        }
+        mesh.set_vertices(&vertices(body));
     } else if let Some(line) = shape.as_polyline_mut() {
         let ends = line.indices().to_vec();
         *line = Polyline::new(vertices(body), Some(ends));

@@ -54,13 +54,14 @@ impl Membrane {
         let rotation = polar_factor(F);
         let deviation = F - rotation;
         let trace = rotation.dot(&deviation);
-        let mut response = MembraneResponse {
-            density: self.mu * deviation.norm_squared() + 0.5 * self.lambda * trace * trace,
-            stress: deviation * (2.0 * self.mu) + rotation * (self.lambda * trace),
+        let (density, stress) = match &self.woven {
+            None => (
+                self.mu * deviation.norm_squared() + 0.5 * self.lambda * trace * trace,
+                deviation * (2.0 * self.mu) + rotation * (self.lambda * trace),
+            ),
+            Some(woven) => woven.evaluate(F, &rotation, &Mat2::identity()),
         };
-        if let Some(woven) = &self.woven {
-            (response.density, response.stress) = woven.evaluate(F, &rotation, &Mat2::identity());
-        }
+        let mut response = MembraneResponse { density, stress };
         if let Some(limits) = self.limits {
             let room = (1.0 - limits[0]).min(limits[1] - 1.0);
             if deviation.norm_squared() > room * room {
