@@ -145,6 +145,14 @@ pub enum HandleError {
         /// Generation of the handle.
         generation: u32,
     },
+    /// The rigid body was removed, or the handle belongs to another set.
+    #[error("no rigid body at slot {index} of generation {generation}")]
+    NoSuchRigidBody {
+        /// Slot of the handle.
+        index: u32,
+        /// Generation of the handle.
+        generation: u32,
+    },
 }
 
 /// Anything that can go wrong outside of stepping; stepping itself never fails.

@@ -111,7 +111,7 @@ pub use energy::{CavityFilling, Elasticity};
 pub use error::{ActuatorError, BodyError, DeformableBodyError, HandleError};
 #[cfg(feature = "export")]
 pub use export::{GltfRecording, SurfaceSequence, VtkSeries};
-pub use fem::{DeformableCavity, DeformableModel, SystemMatrix};
+pub use fem::{DeformableCavity, DeformableModel, RigidRegion, SystemMatrix};
 pub use material::{DeformableMaterial, MaterialError, MaxwellBranch, OrthotropicSheet};
 pub use mesh::{
     MeshError, Structure, SurfaceFault, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport,
@@ -120,7 +120,7 @@ pub use mesh::{
 pub use pipeline::{
     DeformableChannelEventCollector, DeformableCollisionEvent, DeformableContactForceEvent,
     DeformableCounters, DeformableEventHandler, DeformableParameters, DeformablePipeline, DeformableRest,
-    DeformableWorld, JointForce, RigidContact, SolvedJoint,
+    DeformableWorld, InsertedRegion, JointForce, RigidContact, RigidRegionBody, SolvedJoint,
 };
 #[cfg(feature = "debug-render")]
 pub use pipeline::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};
@@ -141,10 +141,11 @@ pub mod prelude {
         DeformableMode, DeformableModel, DeformablePairContact, DeformablePairFilterContext,
         DeformableParameters, DeformablePipeline, DeformableRest, DeformableSkin, DeformableSolverContact,
         DeformableStress, DeformableSurfaceMesh, DeformableSurfacePoint, DeformableTape, DeformableWind,
-        DeformableWorld, DepthCamera, Elasticity, FactorPrecision, Fidelity, Frames, Integrator, JointForce,
-        JointMotorAxis, JointRole, MaterialGradient, MaxwellBranch, OrthotropicSheet, PhysicsParts,
-        RigidContact, SolvedJoint, Solver, SolverSettings, StepGradient, Structure, SurfaceMesh,
-        SurfaceRepair, SystemMatrix, TactilePad, TactileReading, TetMesh,
+        DeformableWorld, DepthCamera, Elasticity, FactorPrecision, Fidelity, Frames, InsertedRegion,
+        Integrator, JointForce, JointMotorAxis, JointRole, MaterialGradient, MaxwellBranch, OrthotropicSheet,
+        PhysicsParts, RigidContact, RigidRegion, RigidRegionBody, SolvedJoint, Solver, SolverSettings,
+        StepGradient, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix, TactilePad, TactileReading,
+        TetMesh,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

@@ -27,11 +27,11 @@ promises! {
         Acceleration, FactorPrecision, Fidelity, Elasticity, CavityFilling, Actuator, ActuatorSignal, DeformableActuators, JointMotorAxis, foible3d::ActuatorError, CablePoint, ContactWrench, DepthCamera, TactilePad, TactileReading, DeformableCable, DeformableCableBuilder, DeformableCableHandle, foible3d::DeformableCavity, DeformableBodyHandle, DeformableAttachment,
         DeformableAttachmentHandle, AttachTo, DeformableContact, DeformablePairContact, RigidContact, JointForce,
         JointRole, SolvedJoint, DeformableSurfacePoint, DeformableBodyError, BodyError, HandleError, MaterialError,
-        MeshError, DeformableContactPartner, DeformableWind, DeformableRest, DeformableMode, DeformableTape, DeformableLoss, DeformableGradient, MaterialGradient, StepGradient, MaxwellBranch, OrthotropicSheet, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceWrapped, SurfaceFault, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableDrag, DeformableCollisionEvent,
+        MeshError, DeformableContactPartner, DeformableWind, DeformableRest, DeformableMode, DeformableTape, DeformableLoss, DeformableGradient, MaterialGradient, StepGradient, MaxwellBranch, OrthotropicSheet, SurfaceMesh, SurfaceRepair, SurfaceRepaired, SurfaceReport, SurfaceWrapped, SurfaceFault, RigidRegion, RigidRegionBody, InsertedRegion, DeformableStress, DeformableSkin, DeformableSurfaceMesh, DeformableColliders, DeformableDrag, DeformableCollisionEvent,
         DeformableContactForceEvent, DeformableChannelEventCollector, DeformableSolverContact,
         DeformablePairFilterContext<'static>, DeformableContactModificationContext<'static>;
-    is_printed: DeformableDrag, DeformableColliders, DeformableSkin, DeformableSurfaceMesh, DeformableChannelEventCollector, DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody, DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh, Structure, DeformableAttachment, DeformableCable, DeformableCableBuilder, DeformableActuators, foible3d::ActuatorError, DepthCamera, TactilePad, TactileReading, DeformableTape, DeformableLoss, DeformableGradient, MaterialGradient, StepGradient;
-    is_cloned: DeformableActuators, foible3d::ActuatorError, DepthCamera, TactilePad, TactileReading, DeformableSkin, DeformableSurfaceMesh, DeformableWorld, DeformableBodySet, DeformableBody, DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh, DeformableTape, DeformableLoss, DeformableGradient,
+    is_printed: DeformableDrag, DeformableColliders, DeformableSkin, DeformableSurfaceMesh, DeformableChannelEventCollector, DeformableWorld, DeformablePipeline, PhysicsParts<'static>, DeformableBodySet, DeformableBody, DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh, Structure, DeformableAttachment, DeformableCable, DeformableCableBuilder, DeformableActuators, foible3d::ActuatorError, DepthCamera, TactilePad, TactileReading, DeformableTape, DeformableLoss, DeformableGradient, MaterialGradient, StepGradient, RigidRegion;
+    is_cloned: RigidRegion, DeformableActuators, foible3d::ActuatorError, DepthCamera, TactilePad, TactileReading, DeformableSkin, DeformableSurfaceMesh, DeformableWorld, DeformableBodySet, DeformableBody, DeformableBodyBuilder, DeformableModel, DeformableState, TetMesh, DeformableTape, DeformableLoss, DeformableGradient,
         Structure, DeformableAttachment, DeformableCable, DeformableCableBuilder, AttachTo, DeformableBodyError, MeshError;
 }
 
@@ -39,7 +39,7 @@ promises! {
 const fn is_copied<T: Copy + PartialEq + Debug>() {}
 
 promises! {
-    is_copied: DeformableMaterial, OrthotropicSheet, DeformableParameters, DeformableCounters, SolverSettings, Solver, SystemMatrix,
+    is_copied: RigidRegionBody, InsertedRegion, DeformableMaterial, OrthotropicSheet, DeformableParameters, DeformableCounters, SolverSettings, Solver, SystemMatrix,
         Frames, Integrator, Acceleration, FactorPrecision, Fidelity, Elasticity, CavityFilling, Actuator, ActuatorSignal, JointMotorAxis, CablePoint, ContactWrench, DeformableCableHandle, foible3d::DeformableCavity, DeformableBodyHandle,
         DeformableAttachmentHandle, DeformableContact, DeformablePairContact, RigidContact, JointForce, JointRole,
         SolvedJoint, DeformableSurfacePoint, BodyError, HandleError, MaterialError, DeformableContactPartner, DeformableWind, DeformableRest,

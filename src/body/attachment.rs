@@ -34,6 +34,7 @@ pub struct DeformableAttachment {
     length: f64,
     #[cfg_attr(feature = "serde-serialize", serde(with = "crate::math::finite_or_none"))]
     break_force: f64,
+    pub(crate) contacts_enabled: bool,
     pub(crate) force: Vec3,
     pub(crate) broken: bool,
     /// Something was changed since the last step.
@@ -77,6 +78,7 @@ impl DeformableAttachment {
             compliance: 0.0,
             length: 0.0,
             break_force: f64::INFINITY,
+            contacts_enabled: true,
             force: Vec3::zeros(),
             broken: false,
             changed: true,
@@ -150,6 +152,18 @@ impl DeformableAttachment {
         self.changed = true;
         self.break_force = force;
         Ok(())
+    }
+
+    /// Whether the body collides with the rigid body that it is attached to, beside its attached vertices.
+    pub fn contacts_enabled(&self) -> bool {
+        self.contacts_enabled
+    }
+
+    /// Sets whether the body collides with the rigid body that it is attached to, as rapier's joints have it; it does unless told
+    /// otherwise, but for the vertices that are attached. Bodies attached to deformable ones do not collide with those at all.
+    pub fn set_contacts_enabled(&mut self, enabled: bool) {
+        self.contacts_enabled = enabled;
+        self.changed = true;
     }
 
     /// Force \[N\] on the body in the last step, summed over its vertices.

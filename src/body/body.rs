@@ -52,6 +52,8 @@ pub(crate) struct StepReport {
     pub tolerance: f64,
     pub guard_retries: usize,
     pub is_rejected: bool,
+    /// Of the island's contact forces, over the largest.
+    pub contact_error: f64,
     pub quarantined: bool,
 }
 

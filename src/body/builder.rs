@@ -32,12 +32,12 @@ use std::sync::Arc;
 #[derive(Clone)]
 #[must_use = "a builder does nothing until it is inserted or built"]
 pub struct DeformableBodyBuilder {
-    model: Result<Arc<DeformableModel>, MeshError>,
+    pub(super) model: Result<Arc<DeformableModel>, MeshError>,
     material: DeformableMaterial,
-    region_materials: Vec<(u32, DeformableMaterial)>,
+    pub(super) region_materials: Vec<(u32, DeformableMaterial)>,
     fillings: Vec<(usize, CavityFilling)>,
     settings: SolverSettings,
-    pose: Pose,
+    pub(super) pose: Pose,
     body_type: RigidBodyType,
     linvel: Vector,
     angvel: Vector,

@@ -31,6 +31,7 @@ mod stress;
 mod wind;
 
 mod builder;
+mod rigid_regions;
 
 mod attachment;
 mod cable;

@@ -68,7 +68,8 @@ pub(crate) struct Constraint {
     /// Displacement per force that the constraint itself gives way by [m/N].
     pub compliance: f64,
     pub restitution: f64,
-    /// Motion over the step of the surface of endpoint 1 along itself, beside the endpoint's own \[m\].
+    /// Motion over the step of the surface of endpoint 1 along itself, beside the endpoint's own \[m\]; of an attachment what the
+    /// arc of the rigid body's point has beyond its straight way.
     pub surface_motion: Vec3,
     pub key: ConstraintKey,
     /// Force on endpoint 0 in the last step \[N\].

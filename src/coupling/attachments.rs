@@ -9,6 +9,7 @@ use crate::body::{
 };
 use crate::contact::{Constraint, Endpoint, Law, ProxyId};
 use crate::math::{Pose64, Vec3};
+use crate::solver::Reaction;
 
 /// Appends the nodes that hard attachments to the world, and to bodies that do not yield, prescribe, each with the
 /// body that it is of; `fastest` \[m\] is how far a node that is not where it belongs is brought back in the step.
@@ -70,6 +71,40 @@ pub(crate) fn attached_nodes(
     }
 }
 
+/// Lists the nodes that hard attachments hold to bodies that yield, each with where that body takes it in the step \[m\], its turn exact.
+pub(crate) fn carried_nodes(
+    deformables: &DeformableBodySet,
+    scene: &mut RapierScene,
+    context: &StepContext<'_>,
+    reactions: &[Reaction],
+    carried: &mut Vec<(DeformableBodyHandle, u32, Vec3)>,
+) {
+    for (_, attachment) in deformables.attachments().filter(|(_, a)| a.is_hard()) {
+        let Anchors::Rigid(rigid, points) = &attachment.anchors else { continue };
+        let Some(body) = context.sets.bodies.get(*rigid) else { continue };
+        let Some(proxy) = scene.body_proxy(context, *rigid) else { continue };
+        let start = Pose64::from_real(body.position());
+        for (node, point) in attachment.nodes.iter().zip(points) {
+            let end = scene.proxies.end_of(proxy, &start.transform(point), reactions, context.h);
+            carried.extend(end.map(|end| (attachment.body(), *node, end)));
+        }
+    }
+}
+
+/// Lists the bodies with the proxies of what they are attached to and do not collide with.
+pub(crate) fn parted(
+    deformables: &DeformableBodySet,
+    scene: &mut RapierScene,
+    context: &StepContext<'_>,
+    parted: &mut Vec<(DeformableBodyHandle, ProxyId)>,
+) {
+    let parts = |a: &DeformableAttachment| !a.is_broken() && !a.contacts_enabled;
+    for (_, attachment) in deformables.attachments().filter(|(_, a)| parts(a)) {
+        let proxy = attachment.rigid().and_then(|rigid| scene.body_proxy(context, rigid));
+        parted.extend(proxy.map(|proxy| (attachment.body(), proxy)));
+    }
+}
+
 /// What attachments have to know of the bodies that are stepped.
 pub(crate) trait SteppedBodies {
     /// Place in the step's list; `None` of bodies that are not stepped.
@@ -110,7 +145,8 @@ pub(crate) fn attachment_constraints(
             if attachment.length() > 0.0 {
                 vertex.add_cable(&anchoring, constraints);
             } else {
-                vertex.add_axes(attachment.compliance(), constraints);
+                let sagitta = scene.proxies.sagitta(&vertex.endpoints[1], context.h);
+                vertex.add_axes(attachment.compliance(), &sagitta, constraints);
             }
         }
     }
@@ -168,13 +204,14 @@ impl AttachedVertex {
         ConstraintKey::Attachment(axis)
     }
 
-    fn add_axes(&self, compliance: f64, constraints: &mut Vec<Constraint>) {
+    fn add_axes(&self, compliance: f64, sagitta: &Vec3, constraints: &mut Vec<Constraint>) {
         for axis in 0..3 {
             let key = self.key(AttachmentDirection::Axis(axis as u32));
             let gap = self.x[axis] - self.point[axis];
             let mut constraint = Constraint::new(self.endpoints, Vec3::ith(axis, 1.0), gap, key);
             constraint.law = Law::BILATERAL;
             constraint.compliance = compliance;
+            constraint.surface_motion = *sagitta;
             constraints.push(constraint);
         }
     }

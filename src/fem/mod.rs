@@ -6,6 +6,7 @@ mod cavities;
 mod elements;
 mod patches;
 mod regions;
+mod rigid_regions;
 mod smoothing;
 mod thin_structure;
 
@@ -35,6 +36,7 @@ pub(crate) use frames::{floating_frame, node_rotations, volume};
 pub(crate) use hard_limits::{HardLimiting, Holds, Room, is_beyond_hard_limits};
 pub use model::DeformableModel;
 pub(crate) use model::{Build, Elements};
+pub use rigid_regions::RigidRegion;
 pub(crate) use stiffness_damping::{Dampers, StiffnessDamping, are_dampers, branch_strain, relaxed};
 pub(crate) use stresses::{ElementState, element_states, section_forces, sheet_stresses};
 pub(crate) use tangents::add_tangents;

@@ -138,6 +138,20 @@ pub enum MeshError {
         /// How many elements there are.
         elements: usize,
     },
+    /// A region that was to be rigid has no tetrahedra, or sheets, rods or springs too.
+    #[error("region {region} cannot be rigid: it must have tetrahedra, and nothing else")]
+    RegionNotSolid {
+        /// The region.
+        region: u32,
+    },
+    /// Two regions that were to be rigid meet.
+    #[error("regions {regions:?} cannot both be rigid: they share vertex {vertex}; make them one region")]
+    RegionsTouch {
+        /// The regions.
+        regions: [u32; 2],
+        /// The vertex.
+        vertex: usize,
+    },
     /// A vertex that no tetrahedron uses has no mass.
     #[error("vertex {vertex} belongs to no tetrahedron")]
     UnusedVertex {

@@ -9,6 +9,7 @@ mod lattice;
 mod mesh_error;
 mod ordering;
 mod repair;
+mod split;
 mod structure;
 mod structure_check;
 mod surface;

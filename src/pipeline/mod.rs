@@ -12,6 +12,7 @@ mod pipeline;
 
 #[cfg(feature = "debug-render")]
 mod debug_render;
+mod rigid_regions;
 mod statics;
 mod world;
 
@@ -24,6 +25,7 @@ pub use events::{
 };
 pub use parameters::{DeformableCounters, DeformableParameters};
 pub use pipeline::DeformablePipeline;
+pub use rigid_regions::{InsertedRegion, RigidRegionBody};
 pub use statics::DeformableRest;
 pub(crate) use step::{SolvedBody, SolvedContact};
 pub use world::DeformableWorld;

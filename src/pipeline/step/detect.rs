@@ -4,11 +4,11 @@ use super::finish::keep_contacts;
 use super::quarantine::quarantine;
 use super::scratch::StepScratch;
 use super::work::BodyWork;
-use crate::body::{DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet};
+use crate::body::{ConstraintKey, DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet};
 use crate::contact::{Constraint, Endpoint};
 use crate::coupling::{
     StepContext, SteppedBodies, WalkContext, attached_nodes, attachment_constraints, cable_constraints,
-    prescribed_nodes,
+    parted, prescribed_nodes,
 };
 use crate::threads::for_each;
 use std::collections::HashMap;
@@ -54,6 +54,8 @@ impl StepScratch {
         prescribed_nodes(deformables, &mut self.scene, context, recovery, &mut self.prescribed);
         self.attached.clear();
         attached_nodes(deformables, &mut self.scene, context, &mut self.attached);
+        self.parted.clear();
+        parted(deformables, &mut self.scene, context, &mut self.parted);
         self.predict_from(0, deformables, context);
     }
 
@@ -71,6 +73,7 @@ impl StepScratch {
         for work in new.iter_mut() {
             work.prescribed.clear();
             work.attached.clear();
+            work.parted.clear();
         }
         let place = |body: &DeformableBodyHandle| self.places.get(body)?.checked_sub(first);
         for (body, node) in &self.prescribed {
@@ -83,9 +86,14 @@ impl StepScratch {
                 new[place].attached.push((*proxy, *node));
             }
         }
+        for (body, proxy) in &self.parted {
+            if let Some(place) = place(body) {
+                new[place].parted.push(*proxy);
+            }
+        }
         for_each(new, |work| {
-            work.attached.sort_unstable();
             work.predict(&deformables[work.handle], context.h, &context.gravity);
+            list_attached(work);
         });
     }
 
@@ -157,6 +165,12 @@ impl StepScratch {
             };
             !constraint.all_endpoints().all(stays)
         });
+        let holds = |c: &&Constraint| matches!(c.key, ConstraintKey::Attachment(_) | ConstraintKey::Cable(_));
+        for endpoint in self.linking.iter().filter(holds).flat_map(Constraint::all_endpoints) {
+            if let Endpoint::Soft { body, .. } = endpoint {
+                self.works[*body].problem.iter_mut().for_each(|problem| problem.is_attached = true);
+            }
+        }
         for endpoint in self.linking.iter().flat_map(|constraint| &constraint.endpoints) {
             if let Endpoint::Soft { body, .. } = endpoint {
                 let nodes = endpoint.soft_nodes().map(|(node, _)| node as u32);
@@ -180,6 +194,17 @@ impl StepScratch {
         self.neighbourhood.walk(&mut around, touched);
         self.counters.neighbourhood_constraints = self.neighbourhood.constraints.len();
     }
+}
+
+/// Puts what attachments hold fast in order.
+fn list_attached(work: &mut BodyWork) {
+    let BodyWork { problem, attached, attached_nodes, .. } = work;
+    attached.sort_unstable();
+    let index = problem.as_ref().map(|problem| &problem.model.surface.index_of_node);
+    attached_nodes.clear();
+    attached_nodes.extend(attached.iter().filter_map(|(_, node)| Some(index?[*node as usize])));
+    attached_nodes.sort_unstable();
+    attached_nodes.dedup();
 }
 
 /// The step's list, as attachments ask it.

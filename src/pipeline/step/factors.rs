@@ -31,7 +31,8 @@ impl StepScratch {
             };
             // Numbers beyond what double precision can factor: stiffness over inertia of 1e15 and more.
             let steps = if body.state.factor_base.is_apart(problem.dt()) { STEPS_KEPT } else { 1 };
-            let Some(done) = factors.prepare(&problem.key, body, steps, work.touched_nodes()) else {
+            let (touched, attached) = (work.touched_nodes(), &work.attached_nodes[..]);
+            let Some(done) = factors.prepare_attached(&problem.key, body, steps, touched, attached) else {
                 quarantine(body, counters);
                 return false;
             };

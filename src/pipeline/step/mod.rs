@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! read_obstacles → sense → wake → predict → detect → detect_soft_pairs → attach → walk_neighbourhood →
-//! choose_integration_order → prepare_factors → form_islands → solve → stop_tunnelling → advance → fall_asleep → tell_events →
-//! hand over reactions → (rapier steps) → after_step
+//! choose_integration_order → prepare_factors → form_islands → solve → stop_tunnelling → advance → carry_attached → fall_asleep →
+//! tell_events → hand over reactions → (rapier steps) → after_step
 //! ```
 
 mod quarantine;

@@ -8,6 +8,7 @@ use super::work::{BodyWork, IslandWork};
 use crate::body::{DeformableBodyHandle, DeformableContact, DeformablePairContact, PrescribedNode};
 use crate::contact::{Candidates, Constraint, ProxyId};
 use crate::coupling::{RapierScene, Reactions, RigidNeighbourhood};
+use crate::math::Vec3;
 use crate::pipeline::{
     DeformableCollisionEvent, DeformableContactForceEvent, DeformableCounters, JointForce, RigidContact,
 };
@@ -36,6 +37,9 @@ pub(in crate::pipeline) struct StepScratch {
     pub(super) prescribed: Vec<(DeformableBodyHandle, PrescribedNode)>,
     /// Nodes that attachments hold fast to rigid bodies.
     pub(super) attached: Vec<(DeformableBodyHandle, ProxyId, u32)>,
+    pub(super) parted: Vec<(DeformableBodyHandle, ProxyId)>,
+    /// Nodes that rigid bodies carry, and to where.
+    pub(super) carried: Vec<(DeformableBodyHandle, u32, Vec3)>,
     /// Constraints of attachments and of contacts between deformables.
     pub(super) linking: Vec<Constraint>,
     pub(super) touching: Touching,

@@ -1,7 +1,9 @@
 //! Who sleeps and who wakes.
 
 use super::work::IslandWork;
-use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Partner, Surroundings};
+use crate::body::{
+    ConstraintKey, DeformableBody, DeformableBodyHandle, DeformableBodySet, Partner, Surroundings,
+};
 use crate::contact::{Candidates, Law};
 use crate::coupling::{RapierScene, RapierSets, StepContext, collider_handle, packed};
 use crate::math::{Pose64, Vec3};
@@ -184,7 +186,11 @@ impl Sleeping {
             return;
         }
         // What a belt carries moves on, however slowly.
-        if island.island.contacts.results().any(|c| c.constraint.surface_motion != Vec3::zeros()) {
+        let runs = |c: ContactResult<'_>| {
+            let is_belt = !matches!(c.constraint.key, ConstraintKey::Attachment(_));
+            is_belt && c.constraint.surface_motion != Vec3::zeros()
+        };
+        if island.island.contacts.results().any(runs) {
             return;
         }
         let first = self.rigid.len();

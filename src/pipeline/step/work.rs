@@ -38,6 +38,10 @@ pub(super) struct BodyWork {
     pub has_cables: bool,
     /// Nodes that attachments hold fast to a rigid body, by that body's proxy, ascending: they do not collide with it.
     pub attached: Vec<(ProxyId, u32)>,
+    /// The nodes of that list, as indices into the surface's, ascending.
+    pub attached_nodes: Vec<u32>,
+    /// Proxies of what the body is attached to and does not collide with.
+    pub parted: Vec<ProxyId>,
     /// Nodes that attachments prescribe.
     pub prescribed: Vec<PrescribedNode>,
     /// Box around all that the body may touch over the step.
@@ -68,6 +72,8 @@ impl BodyWork {
             linked_nodes: Vec::new(),
             has_cables: false,
             attached: Vec::new(),
+            attached_nodes: Vec::new(),
+            parted: Vec::new(),
             prescribed: Vec::new(),
             extent: Aabb::new_invalid(),
             has_neighbours: false,
@@ -178,6 +184,9 @@ impl BodyWork {
         candidates.near(&self.extent, &mut self.near);
         for &o in &self.near {
             let handle = scene.colliders[o as usize];
+            if self.parted.contains(&scene.obstacles[o as usize].proxy) {
+                continue;
+            }
             let Some(collider) = context.sets.colliders.get(handle) else { continue };
             let Some((friction, restitution)) = combined(body, collider) else { continue };
             let hooked = HookedPair::with_collider((self.handle, body), (handle, collider));

@@ -48,6 +48,7 @@ impl BodyProblem {
             guard_retries: 0,
             is_rejected: false,
             was_redone: false,
+            is_attached: false,
             weight: 0.0,
             total_mass: 0.0,
             step: vec![Vec3::zeros(); n],
@@ -110,6 +111,7 @@ impl BodyProblem {
         self.guard_retries = 0;
         self.is_rejected = false;
         self.was_redone = false;
+        self.is_attached = false;
         self.begin_limits();
         self.kinetic_bound = f64::INFINITY;
         self.preconditioner.counters = SolveCounters::default();

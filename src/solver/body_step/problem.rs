@@ -97,6 +97,8 @@ pub(crate) struct BodyProblem {
     pub is_rejected: bool,
     /// Generalized-α would have made energy: implicit Euler took its place.
     pub was_redone: bool,
+    /// Attachments or cables hold it.
+    pub is_attached: bool,
     /// A force that counts as large for this body \[N\].
     pub weight: f64,
     /// \[kg\]

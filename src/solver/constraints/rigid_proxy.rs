@@ -1,7 +1,7 @@
 //! The rigid endpoint of contacts: how points of it move over a step, and how they yield.
 
 use crate::contact::{Endpoint, ProxyId};
-use crate::math::{Mat3, Pose64, Vec3, rotation_vector};
+use crate::math::{Mat3, Pose64, Vec3, rotation_from_vector, rotation_vector};
 use nalgebra::{Matrix6, Vector6};
 
 /// Linear and angular part of a motion; the linear one is of the centre of mass.
@@ -155,6 +155,29 @@ impl RigidProxies {
                 proxy.at(endpoint, &twist) * h
             }
         }
+    }
+
+    /// What the arc of a yielding body's point over a step of `h` \[s\] has beyond the straight way of [`Self::displacement`], as the body
+    /// turns at its start \[m\]: towards the axis, `(ω h)² r / 2`.
+    pub fn sagitta(&self, endpoint: &Endpoint, h: f64) -> Vec3 {
+        let Endpoint::Rigid { proxy, point } = endpoint else { return Vec3::zeros() };
+        let proxy = self.get(*proxy);
+        match proxy {
+            RigidProxy::Prescribed { .. } => Vec3::zeros(),
+            RigidProxy::Rigid { free, .. } | RigidProxy::Link { free, .. } => {
+                let (turn, arm) = (free.angular * h, point - proxy.com());
+                rotation_from_vector(&turn) * arm - arm - turn.cross(&arm)
+            }
+        }
+    }
+
+    /// Where a point of a yielding body is at the end of a step of `h` \[s\] under reactions \[m\], its turn exact; `None` of others.
+    pub fn end_of(&self, id: ProxyId, point: &Vec3, reactions: &[Reaction], h: f64) -> Option<Vec3> {
+        let proxy = self.get(id);
+        let (RigidProxy::Rigid { free, .. } | RigidProxy::Link { free, .. }) = proxy else { return None };
+        let gained = self.gained(proxy, id, reactions);
+        let turn = rotation_from_vector(&((free.angular + gained.angular) * h));
+        Some(proxy.com() + (free.linear + gained.linear) * h + turn * (point - proxy.com()))
     }
 
     /// As [`Self::displacement`], of what the reactions add alone.
