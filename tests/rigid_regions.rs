@@ -100,7 +100,9 @@ fn an_insert_moves_rigidly_thrown_and_dropped() {
         };
         let (mut start, mut most) = (f64::NAN, 0.0f64);
         let mut touched = false;
-        for step in 0..(1.0 / dt) as usize {
+        // It lands after 0.26 s.
+        let seconds = if dt < 2e-3 { 0.4 } else { 1.0 };
+        for step in 0..(seconds / dt) as usize {
             world.step(&mut physics);
             let own = &world.bodies[body];
             touched |= world.contact_force(body, floor) != Vector::ZERO;
@@ -304,6 +306,20 @@ fn what_cannot_be_rigid_says_why() {
     assert_eq!(insert(bar(1e5).regions(|_| 1), &[(1, new)]), MeshError::Empty.into());
     let cloth = DeformableBodyBuilder::cloth([0.1, 0.1], [4, 4], 1e-3).regions(|_| 1);
     assert_eq!(insert(cloth, &[(1, new)]), MeshError::RegionNotSolid { region: 1 }.into());
+    // Every other cell: what is left hangs together by edges.
+    let checks = |x: [f64; 3]| x.iter().map(|c| ((c + 0.2) / 0.01) as u32).sum::<u32>() % 2;
+    let checks = insert(bar(1e5).regions(checks), &[(1, new)]);
+    assert!(matches!(checks, DeformableBodyError::Mesh(_)), "{checks}");
+    // Two blocks that do not meet, in one mesh.
+    let block = TetMesh::cuboid([0.1; 3], [1; 3]).unwrap();
+    let mut points = block.vertices().to_vec();
+    points.extend(block.vertices().iter().map(|[x, y, z]| [x + 1.0, *y, *z]));
+    let count = block.vertices().len() as u32;
+    let mut tets = block.tetrahedra().to_vec();
+    tets.extend(block.tetrahedra().iter().map(|tet| tet.map(|v| v + count)));
+    let pair = DeformableBodyBuilder::mesh(&TetMesh::new(points, tets).unwrap());
+    let apart = insert(pair.regions(|[x, ..]| u32::from(x > 0.5)), &[(1, new)]);
+    assert!(matches!(apart, DeformableBodyError::Body(BodyError::NoVertices { .. })), "{apart}");
     for density in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let error = insert(bar(1e5), &[(BONE, RigidRegionBody::New(density))]);
         assert!(matches!(

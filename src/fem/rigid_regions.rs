@@ -55,7 +55,8 @@ impl DeformableModel {
     /// their order. [`DeformableWorld::insert_with_rigid_regions`](crate::DeformableWorld::insert_with_rigid_regions) does all of it.
     ///
     /// # Errors
-    /// [`MeshError::RegionNotSolid`], [`MeshError::RegionsTouch`]; [`MeshError::Empty`] if nothing is left.
+    /// [`MeshError::RegionNotSolid`], [`MeshError::RegionsTouch`]; [`MeshError::Empty`] if nothing is left; [`MeshError::NonManifoldEdge`] if what is
+    /// left hangs together by an edge.
     pub fn without_regions(&self, regions: &[u32]) -> Result<(Self, Vec<RigidRegion>), MeshError> {
         let split = self.structure.split(regions)?;
         let points: Vec<Vec3> = self.structure.vertices().iter().map(|v| (*v).into()).collect();

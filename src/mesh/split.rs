@@ -2,6 +2,7 @@
 
 use super::mesh_error::MeshError;
 use super::structure::{SheetTriangle, Spring, Structure};
+use super::tet_mesh::check_surface;
 
 /// A structure without the tetrahedra of some regions.
 pub(crate) struct Split {
@@ -18,7 +19,7 @@ impl Structure {
     ///
     /// # Errors
     /// [`MeshError::RegionNotSolid`] for a region without tetrahedra or with other elements, [`MeshError::RegionsTouch`],
-    /// [`MeshError::Empty`] if nothing is left.
+    /// [`MeshError::Empty`] if nothing is left, and what is wrong with the surface of what is.
     pub(crate) fn split(&self, regions: &[u32]) -> Result<Split, MeshError> {
         let thin = self.rods.iter().flat_map(|rod| rod.regions.iter().copied());
         let thin = thin.chain(self.sheets.iter().map(|sheet| sheet.region));
@@ -41,7 +42,11 @@ impl Structure {
         }
         self.check_apart(regions, &taken)?;
         let kept = rest.drop_unused();
-        if rest.vertices.is_empty() { Err(MeshError::Empty) } else { Ok(Split { rest, kept, taken }) }
+        if rest.vertices.is_empty() {
+            return Err(MeshError::Empty);
+        }
+        check_surface(&rest.tetrahedra)?;
+        Ok(Split { rest, kept, taken })
     }
 
     /// Regions that are taken out must not meet: what is attached to one cannot be attached to another.

@@ -252,7 +252,7 @@ pub(crate) fn tetrahedron_holds([a, b, c, d]: &[Vec3; 4], p: &Vec3) -> bool {
     })
 }
 
-fn check_surface(tetrahedra: &[[u32; 4]]) -> Result<(), MeshError> {
+pub(super) fn check_surface(tetrahedra: &[[u32; 4]]) -> Result<(), MeshError> {
     let triangles =
         boundary_triangles(tetrahedra).map_err(|(face, count)| MeshError::NonManifoldFace { face, count })?;
     for EdgeUse { edge, count } in edge_uses(&triangles) {

@@ -63,7 +63,8 @@ impl DeformableWorld {
     ///
     /// # Errors
     /// As [`DeformableBodyBuilder::build`] and [`DeformableBodyBuilder::without_regions`]; [`BodyError::OutOfRange`] for a density that
-    /// is not positive and finite; [`HandleError::NoSuchRigidBody`]. Nothing is inserted then.
+    /// is not positive and finite; [`HandleError::NoSuchRigidBody`]; [`BodyError::NoVertices`]
+    /// for a region that nothing hangs on. Nothing is inserted then.
     pub fn insert_with_rigid_regions(
         &mut self,
         builder: DeformableBodyBuilder,
@@ -75,6 +76,9 @@ impl DeformableWorld {
         }
         let numbers: Vec<u32> = regions.iter().map(|(region, _)| *region).collect();
         let (builder, rigid) = builder.without_regions(&numbers)?;
+        if rigid.iter().any(|region| region.vertices().is_empty()) {
+            return Err(BodyError::NoVertices { quantity: "attachment of a rigid region" }.into());
+        }
         let pose = builder.rest_pose();
         let body = self.insert(builder)?;
         let mut inserted = Vec::with_capacity(rigid.len());
