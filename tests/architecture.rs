@@ -27,8 +27,15 @@ const ROOMS: [&[&str]; 15] = [
 ];
 
 /// Within `solver`, from the ground up.
-const SOLVER: [&[&str]; 7] =
-    [&["counters"], &["linear"], &["body_step"], &["acceleration"], &["cone"], &["constraints"], &["island"]];
+const SOLVER: [&[&str]; 7] = [
+    &["counters"],
+    &["linear"],
+    &["body_step"],
+    &["acceleration"],
+    &["cone"],
+    &["constraints"],
+    &["island", "rejected_steps"],
+];
 
 /// Within the command's package, from the ground up.
 const CLI: [&[&str]; 9] = [

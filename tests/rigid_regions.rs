@@ -1,5 +1,6 @@
 //! Regions that are rigid: bones and inserts, as rapier bodies of their own or part of one.
 mod common;
+use common::games::{Random, weightless};
 use common::*;
 use foible3d::prelude::*;
 use foible3d::{BodyError, HandleError, MeshError};
@@ -15,13 +16,6 @@ fn bar(modulus: f64) -> DeformableBodyBuilder {
         .can_sleep(false)
 }
 
-fn weightless(dt: f32) -> PhysicsWorld {
-    let mut physics = PhysicsWorld::new();
-    physics.gravity = Vector::ZERO;
-    physics.integration_parameters.dt = dt;
-    physics
-}
-
 /// The largest change of a distance between vertices, over the longest.
 fn distortion(body: &DeformableBody, vertices: &[usize]) -> f64 {
     let x: Vec<[f64; 3]> = vertices.iter().map(|&v| body.position(v).unwrap()).collect();
@@ -35,6 +29,14 @@ fn distortion(body: &DeformableBody, vertices: &[usize]) -> f64 {
         }
     }
     worst / longest
+}
+
+/// Elastic, kinetic and of height \[J\].
+fn energy_of_all(own: &DeformableBody, rigid: &[&RigidBody]) -> f64 {
+    let weight = |body: &&RigidBody| f64::from(body.mass()) * f64::from(body.center_of_mass().y);
+    let kinetic: f64 = rigid.iter().map(|body| f64::from(body.kinetic_energy())).sum();
+    let height = own.center_of_mass()[1] * own.mass() + rigid.iter().map(weight).sum::<f64>();
+    total_energy(own) + kinetic + G * height
 }
 
 fn attached(body: &DeformableBody) -> Vec<usize> {
@@ -67,7 +69,7 @@ fn mass_and_inertia_are_those_of_the_solid() {
     let whole = [0.1f32, 0.02, 0.02].map(|half| 2.0 * f64::from(half)).iter().product::<f64>();
     assert!((rest.mass() - 1_100.0 * (whole - a * b * c)).abs() < 1e-12);
     // In rapier's single precision.
-    let (mut physics, mut world) = (weightless(1.0 / 60.0), DeformableWorld::new());
+    let (mut physics, mut world) = (weightless(), DeformableWorld::new());
     let (_, bones) = world
         .insert_with_rigid_regions(bar(1e5), &[(BONE, RigidRegionBody::New(density))], &mut physics)
         .unwrap();
@@ -90,13 +92,9 @@ fn an_insert_moves_rigidly_thrown_and_dropped() {
         let kind = RigidRegionBody::New(7_800.0);
         let (body, bones) = world.insert_with_rigid_regions(thrown, &[(BONE, kind)], &mut physics).unwrap();
         let core = attached(&world.bodies[body]);
-        let (mut worst, mut off, mut unsolved) = (0.0f64, 0.0f64, 0);
+        let (mut worst, mut off, mut unsolved, mut left) = (0.0f64, 0.0f64, 0, 0.0f64);
         let energy = |world: &DeformableWorld, physics: &PhysicsWorld| {
-            let bone = &physics.bodies[bones[0].body];
-            let height = f64::from(bone.translation().y) * 7_800.0 * 4e-5;
-            let own = &world.bodies[body];
-            let height = height + own.center_of_mass()[1] * own.mass();
-            total_energy(own) + f64::from(bone.kinetic_energy()) + G * height
+            energy_of_all(&world.bodies[body], &[&physics.bodies[bones[0].body]])
         };
         let (mut start, mut most) = (f64::NAN, 0.0f64);
         let mut touched = false;
@@ -111,7 +109,7 @@ fn an_insert_moves_rigidly_thrown_and_dropped() {
             most = most.max(energy(&world, &physics) / start);
             let error = distortion(own, &core);
             if own.last_step_rejected() || world.counters().contact_error > 1e-3 {
-                unsolved += 1;
+                (unsolved, left) = (unsolved + 1, left.max(error));
                 continue;
             }
             worst = worst.max(error);
@@ -125,7 +123,7 @@ fn an_insert_moves_rigidly_thrown_and_dropped() {
             }
         }
         println!(
-            "{modulus:e} Pa, {dt} s: distortion {worst:.1e}, off the bone {off:.1e} m, energy at most {most:.4} of the start, {unsolved} unsolved steps"
+            "{modulus:e} Pa, {dt} s: distortion {worst:.1e}, off the bone {off:.1e} m, energy at most {most:.4} of the start, {unsolved} unsolved steps with {left:.1e}"
         );
         assert!(touched && worst < 1e-9, "{worst:e}");
         assert!(most < 1.005, "{most}");
@@ -136,9 +134,9 @@ fn an_insert_moves_rigidly_thrown_and_dropped() {
 }
 
 #[test]
-fn what_flies_keeps_its_momenta_and_makes_no_energy() {
+fn what_flies_keeps_its_momentum_and_makes_no_energy() {
     for modulus in [1e4, 1e6, 1e9] {
-        let (mut physics, mut world) = (weightless(1.0 / 60.0), DeformableWorld::new());
+        let (mut physics, mut world) = (weightless(), DeformableWorld::new());
         let thrown = bar(modulus).linvel(Vector::X).angvel(Vector::new(0.5, 2.0, 6.0));
         let kind = RigidRegionBody::New(7_800.0);
         let (body, bones) = world.insert_with_rigid_regions(thrown, &[(BONE, kind)], &mut physics).unwrap();
@@ -196,17 +194,12 @@ fn a_rigid_core_is_one_of_a_hundred_thousand_times_the_stiffness() {
     assert!((tips[0] / tips[1] - 1.0).abs() < 1e-3, "{tips:?}");
 }
 
-/// Steps until two seconds have passed; the fastest vertex of the last quarter of a second [m/s].
+/// Steps three seconds; the fastest vertex of the last quarter of a second [m/s].
 fn settle(world: &mut DeformableWorld, physics: &mut PhysicsWorld, body: DeformableBodyHandle) -> f64 {
     let mut fastest = 0.0f64;
     for step in 0..180 {
         world.step(physics);
-        if step >= 165 {
-            let own = &world.bodies[body];
-            let speeds = (0..own.model().vertex_count()).map(|v| own.velocity(v).unwrap());
-            let speeds = speeds.map(|v| v.iter().map(|c| c * c).sum::<f64>().sqrt());
-            fastest = speeds.fold(fastest, f64::max);
-        }
+        fastest = if step < 165 { 0.0 } else { fastest.max(world.bodies[body].max_speed()) };
     }
     fastest
 }
@@ -260,7 +253,10 @@ fn a_region_is_part_of_a_link_that_leads_it() {
         assert!(error < 1e-9, "{error:e}");
     }
     // It carries the weight.
-    (0..240).for_each(|_| world.step(&mut physics));
+    (0..600).for_each(|_| world.step(&mut physics));
+    let held = world.bodies.attachment(regions[0].attachment).unwrap().force().y;
+    let weight = world.bodies[body].mass() * G;
+    assert!((f64::from(held) / weight - 1.0).abs() < 1e-3, "{held} of {weight}");
     // Let go, it falls.
     assert!(world.bodies.detach(regions[0].attachment).is_some());
     (0..30).for_each(|_| world.step(&mut physics));
@@ -330,4 +326,68 @@ fn what_cannot_be_rigid_says_why() {
     let gone = insert(bar(1e5), &[(BONE, RigidRegionBody::PartOf(RigidBodyHandle::from_raw_parts(3, 4)))]);
     assert_eq!(gone, HandleError::NoSuchRigidBody { index: 3, generation: 4 }.into());
     assert_eq!((physics.bodies.len(), world.bodies.iter().count()), (0, 0));
+}
+
+/// A bar with a core, or with a block glued to either end, thrown on a floor in one of many ways. The most that its energy comes to over
+/// that at the start; what has to be positive for a fall.
+fn most_energy_of_a_throw(seed: u64, has_core: bool) -> f64 {
+    let mut random = Random(seed * 7919 + 17);
+    (0..5).for_each(|_| _ = random.unit());
+    let modulus = 10f64.powi(4 + random.below(6) as i32);
+    let dt = [1.0 / 240.0, 1.0 / 60.0, 1.0 / 30.0, 0.05][random.below(4) as usize];
+    let density = [1_000.0, 7_800.0, 20_000.0][random.below(3) as usize];
+    let spin = Vector::new(random.unit() - 0.5, random.unit() - 0.5, random.unit() - 0.5) * 20.0;
+    let (mut physics, _) = world_with_floor(dt);
+    let mut world = DeformableWorld::new();
+    let thrown = bar(modulus).translation(Vector::Y * 0.4);
+    let (body, rigid) = if has_core {
+        let kind = RigidRegionBody::New(f64::from(density));
+        let (body, bones) =
+            world.insert_with_rigid_regions(thrown.angvel(spin), &[(BONE, kind)], &mut physics).unwrap();
+        (body, vec![bones[0].body])
+    } else {
+        let body = world.insert(thrown).unwrap();
+        let mut block = |side: f32| {
+            let at = RigidBodyBuilder::dynamic().translation(Vector::new(side * 0.12, 0.4, 0.0));
+            let shape = ColliderBuilder::cuboid(0.02, 0.02, 0.02).density(density);
+            let block = physics.insert(at, shape).0;
+            let end = at_rest_where(&world.bodies[body], |x| f64::from(side) * x[0] > 0.1 - 1e-6);
+            let to = AttachTo::RigidBody(block, *physics.bodies[block].position());
+            world.bodies.attach(body, &end, to).unwrap();
+            block
+        };
+        (body, [-1.0, 1.0].map(&mut block).to_vec())
+    };
+    let energy = |world: &DeformableWorld, physics: &PhysicsWorld| {
+        let rigid: Vec<&RigidBody> = rigid.iter().map(|&handle| &physics.bodies[handle]).collect();
+        energy_of_all(&world.bodies[body], &rigid)
+    };
+    // Rapier gives its bodies their masses in their first step.
+    world.step(&mut physics);
+    let start = energy(&world, &physics);
+    let energies = (0..(1.2 / dt) as usize).map(|_| {
+        world.step(&mut physics);
+        energy(&world, &physics) / start
+    });
+    // NaN is no largest number: it is told.
+    energies.fold(0.0, |most: f64, now| if now.is_nan() { f64::INFINITY } else { most.max(now) })
+}
+
+/// Seeds 1 to 3 made 1e25, 1e13 and 364 times their energy while arcs of attached points took the turn of the step's start.
+#[test]
+fn random_throws_make_no_energy() {
+    for seed in 0..4 {
+        let most = [true, false].map(|has_core| most_energy_of_a_throw(seed, has_core));
+        println!("throw {seed}: {most:.4?} of the start");
+        assert!(most.iter().all(|most| *most < 1.01), "{seed} {most:?}");
+    }
+}
+
+#[test]
+#[ignore = "slow tier"]
+fn more_random_throws_make_no_energy() {
+    for seed in 4..16 {
+        let most = [true, false].map(|has_core| most_energy_of_a_throw(seed, has_core));
+        assert!(most.iter().all(|most| *most < 1.01), "{seed} {most:?}");
+    }
 }

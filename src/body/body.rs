@@ -52,8 +52,6 @@ pub(crate) struct StepReport {
     pub tolerance: f64,
     pub guard_retries: usize,
     pub is_rejected: bool,
-    /// Of the island's contact forces, over the largest.
-    pub contact_error: f64,
     pub quarantined: bool,
 }
 
@@ -294,7 +292,7 @@ pub(super) fn rotation(quantity: &'static str, value: Rotation) -> Result<(), Bo
 }
 
 /// A number of the user's, if it is in its range.
-pub(super) fn in_range(
+pub(crate) fn in_range(
     quantity: &'static str,
     value: f64,
     wanted: &'static str,

@@ -45,7 +45,7 @@ mod cable_route;
 pub(crate) use attachment::{Anchors, PrescribedNode};
 pub use attachment::{AttachTo, DeformableAttachment};
 pub use body::DeformableBody;
-pub(crate) use body::check_pose;
+pub(crate) use body::{check_pose, in_range};
 pub use builder::DeformableBodyBuilder;
 pub use cable::{CablePoint, DeformableCable, DeformableCableBuilder};
 pub(crate) use cable::{Guide, Winch};

@@ -40,6 +40,11 @@ impl Law {
     pub const fn bilateral(limit: f64) -> Self {
         Self::Bounded { least: -limit, most: limit }
     }
+
+    /// Whether it pulls as well as pushes.
+    pub fn is_bilateral(&self) -> bool {
+        matches!(self, Self::Bounded { least, .. } if *least < 0.0)
+    }
 }
 
 /// A point that a constraint along a path acts on.
@@ -108,6 +113,11 @@ impl Constraint {
     pub fn along(path: Vec<PathPoint>, idle: ProxyId, gap: f64, law: Law, key: ConstraintKey) -> Self {
         let nothing = Endpoint::Rotation { proxy: idle };
         Self { path, law, ..Self::new([nothing; 2], Vec3::x(), gap, key) }
+    }
+
+    /// Whether it holds two points together, pulling or pushing, and does not give way.
+    pub fn is_hard_hold(&self) -> bool {
+        self.path.is_empty() && self.compliance == 0.0 && self.law.is_bilateral()
     }
 
     /// Everything that it acts on.

@@ -83,11 +83,10 @@ pub(crate) fn carried_nodes(
         let Anchors::Rigid(rigid, points) = &attachment.anchors else { continue };
         let Some(body) = context.sets.bodies.get(*rigid) else { continue };
         let Some(proxy) = scene.body_proxy(context, *rigid) else { continue };
+        let Some(end) = scene.proxies.carries(proxy, reactions, context.h) else { continue };
         let start = Pose64::from_real(body.position());
-        for (node, point) in attachment.nodes.iter().zip(points) {
-            let end = scene.proxies.end_of(proxy, &start.transform(point), reactions, context.h);
-            carried.extend(end.map(|end| (attachment.body(), *node, end)));
-        }
+        let nodes = attachment.nodes.iter().zip(points);
+        carried.extend(nodes.map(|(node, point)| (attachment.body(), *node, end(&start.transform(point)))));
     }
 }
 
@@ -145,8 +144,7 @@ pub(crate) fn attachment_constraints(
             if attachment.length() > 0.0 {
                 vertex.add_cable(&anchoring, constraints);
             } else {
-                let sagitta = scene.proxies.sagitta(&vertex.endpoints[1], context.h);
-                vertex.add_axes(attachment.compliance(), &sagitta, constraints);
+                vertex.add_axes(attachment.compliance(), constraints);
             }
         }
     }
@@ -204,14 +202,13 @@ impl AttachedVertex {
         ConstraintKey::Attachment(axis)
     }
 
-    fn add_axes(&self, compliance: f64, sagitta: &Vec3, constraints: &mut Vec<Constraint>) {
+    fn add_axes(&self, compliance: f64, constraints: &mut Vec<Constraint>) {
         for axis in 0..3 {
             let key = self.key(AttachmentDirection::Axis(axis as u32));
             let gap = self.x[axis] - self.point[axis];
             let mut constraint = Constraint::new(self.endpoints, Vec3::ith(axis, 1.0), gap, key);
             constraint.law = Law::BILATERAL;
             constraint.compliance = compliance;
-            constraint.surface_motion = *sagitta;
             constraints.push(constraint);
         }
     }

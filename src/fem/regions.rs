@@ -113,7 +113,7 @@ impl DeformableModel {
     /// [`Structure::painted`](crate::Structure::painted).
     #[must_use]
     pub fn painted(&self, region: impl Fn([f64; 3]) -> u32) -> Self {
-        self.remade((*self.structure).clone().painted(region))
+        self.remade((*self.structure).clone().painted(region), Some)
     }
 
     /// The same with the direction of the warp in its sheets, as [`Structure::with_warp`](crate::Structure::with_warp).
@@ -121,16 +121,19 @@ impl DeformableModel {
     /// # Errors
     /// [`MeshError::BadWarp`].
     pub fn with_warp(&self, direction: impl Fn([f64; 3]) -> [f64; 3]) -> Result<Self, MeshError> {
-        Ok(self.remade((*self.structure).clone().with_warp(direction)?))
+        Ok(self.remade((*self.structure).clone().with_warp(direction)?, Some))
     }
 
-    /// Of a structure of the same elements, with its fibres and smoothing.
-    fn remade(&self, structure: Structure) -> Self {
+    /// Of a structure of the same elements, or some of them, with their fibres and smoothing; `kept` is the number there of a vertex here.
+    pub(super) fn remade(&self, structure: Structure, kept: impl Fn(u32) -> Option<u32>) -> Self {
         let mut remade = Self::of(structure);
-        // Nodes keep their order, tetrahedra do not.
-        let places: HashMap<[u32; 4], u32> = remade.tetrahedra.iter().copied().zip(0..).collect();
-        let place = |(tet, along): &(u32, Vec3)| (places[&self.tetrahedra[*tet as usize]], *along);
-        remade.add_fibres(&self.fibres.iter().map(place).collect::<Vec<_>>());
+        let places: HashMap<[u32; 4], u32> = remade.tetrahedra().zip(0..).collect();
+        let there = |node: u32| kept(self.vertex_of_node[node as usize]);
+        let fibres = self.fibres.iter().filter_map(|(tet, along)| {
+            let [a, b, c, d] = self.tetrahedra[*tet as usize].map(there);
+            Some((*places.get(&[a?, b?, c?, d?])?, *along))
+        });
+        remade.add_fibres(&fibres.collect::<Vec<_>>());
         if self.is_smoothed() { remade.smoothed() } else { remade }
     }
 

@@ -2,7 +2,7 @@
 
 use super::model::DeformableModel;
 use crate::math::{Mat3, Vec3};
-use crate::mesh::{MeshError, Structure, signed_volume, sorted_face, sorted_faces};
+use crate::mesh::{MeshError, signed_volume, sorted_face, sorted_faces};
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 /// A region that was taken out of a body to be rigid: a bone, an insert of metal. Its frame is that of the rest shape.
@@ -69,22 +69,8 @@ impl DeformableModel {
             RigidRegion { region: *region, vertices, volume, centre, moments, skin }
         };
         let rigid = regions.iter().zip(&split.taken).map(region_of).collect();
-        let rest = self.remade_without(split.rest, &split.kept);
+        let rest = self.remade(split.rest, |vertex| split.kept[vertex as usize]);
         Ok((rest, rigid))
-    }
-
-    /// Of what is left of its structure, with the fibres and smoothing of that.
-    fn remade_without(&self, structure: Structure, kept: &[Option<u32>]) -> Self {
-        let mut rest = Self::of(structure);
-        let places: HashMap<[u32; 4], u32> = rest.tetrahedra().zip(0..).collect();
-        let fibres = self.fibres.iter().filter_map(|(tet, along)| {
-            let [a, b, c, d] =
-                self.tetrahedra[*tet as usize].map(|n| kept[self.vertex(n as usize)].unwrap_or(u32::MAX));
-            Some((*places.get(&[a, b, c, d])?, *along))
-        });
-        let fibres: Vec<(u32, Vec3)> = fibres.collect();
-        rest.add_fibres(&fibres);
-        if self.is_smoothed() { rest.smoothed() } else { rest }
     }
 }
 

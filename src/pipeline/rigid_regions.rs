@@ -3,6 +3,7 @@
 use super::world::DeformableWorld;
 use crate::body::{
     AttachTo, DeformableAttachmentHandle, DeformableBody, DeformableBodyBuilder, DeformableBodyHandle,
+    in_range,
 };
 use crate::error::{BodyError, DeformableBodyError, HandleError};
 use crate::fem::RigidRegion;
@@ -106,15 +107,15 @@ impl DeformableWorld {
 
 fn check(kind: &RigidRegionBody, physics: &PhysicsWorld) -> Result<(), DeformableBodyError> {
     match *kind {
-        RigidRegionBody::New(density) if !(density > 0.0 && density.is_finite()) => {
-            let wanted = "positive and finite";
-            Err(BodyError::OutOfRange { quantity: "density", value: density, wanted }.into())
+        RigidRegionBody::New(density) => {
+            let is_in = density > 0.0 && density.is_finite();
+            Ok(in_range("density", density, "positive and finite", is_in)?)
         }
-        RigidRegionBody::PartOf(handle) if !physics.bodies.contains(handle) => {
+        RigidRegionBody::PartOf(handle) if physics.bodies.contains(handle) => Ok(()),
+        RigidRegionBody::PartOf(handle) => {
             let (index, generation) = handle.into_raw_parts();
             Err(HandleError::NoSuchRigidBody { index, generation }.into())
         }
-        _ => Ok(()),
     }
 }
 

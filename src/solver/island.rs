@@ -26,7 +26,7 @@ pub(crate) struct Island {
     trials: Vec<Trial>,
     /// Its bodies are worth several threads.
     is_large: bool,
-    newton_factors: NewtonFactors,
+    pub(super) newton_factors: NewtonFactors,
 }
 
 /// How the step of an island went.
@@ -62,9 +62,7 @@ const BEFORE_SOLVE: Slack = Slack { edges: 0.01, motions: 0.05 };
 /// The same after a solve: what overlaps, and of what moves what nearly does.
 const AFTER_SOLVE: Slack = Slack { edges: -1.0e-5, motions: 0.05 };
 /// Residual over forces, and error of contact forces, beyond which a step goes on and is looked at again.
-const FAR_FROM_SOLVED: f64 = 0.1;
-/// Contact problems of rejected steps, at the most, until contacts turn them no more.
-const FALLBACK_ROUNDS: usize = 4;
+pub(super) const FAR_FROM_SOLVED: f64 = 0.1;
 /// Largest factor on A that the guard tries.
 const MAX_STEP_DAMPING: f64 = 1024.0;
 
@@ -185,80 +183,6 @@ impl Island {
         self.bodies.iter_mut().filter(|b| b.key.pins.is_empty()).for_each(BodyProblem::balance);
     }
 
-    /// Bodies whose step is far from solved and would gain energy are rejected: where forces change wildly from iteration
-    /// to iteration, what they have done to a body is not what the last ones take from others.
-    pub fn reject_steps_that_gain_energy(&mut self, context: &SolveContext<'_>) {
-        loop {
-            let mut gains = false;
-            for index in 0..self.bodies.len() {
-                if self.would_be_rejected(index, context) {
-                    self.bodies[index].is_rejected = true;
-                    gains = true;
-                }
-            }
-            if !gains {
-                break;
-            }
-            self.step_rigid_fallbacks(context);
-        }
-    }
-
-    fn would_be_rejected(&mut self, index: usize, context: &SolveContext<'_>) -> bool {
-        let body = &self.bodies[index];
-        let is_solved = self.contacts.work.error <= FAR_FROM_SOLVED
-            && body.residual() <= FAR_FROM_SOLVED * body.force_scale();
-        !is_solved && self.would_gain_energy(index, 0.0, context)
-    }
-
-    /// Whether a body's step makes energy, with what its contacts make and `besides` \[J\]; not if it was rejected.
-    pub fn would_gain_energy(&mut self, index: usize, besides: f64, context: &SolveContext<'_>) -> bool {
-        if self.bodies[index].is_rejected {
-            return false;
-        }
-        let by_contacts = self.contacts.made_energy(index, &self.bodies, context);
-        self.bodies[index].gains_energy(by_contacts.max(0.0) + besides)
-    }
-
-    /// Moves bodies whose step was rejected as rigid ones, with contacts solved anew; again about where those have turned one.
-    pub fn step_rigid_fallbacks(&mut self, context: &SolveContext<'_>) {
-        for index in 0..self.bodies.len() {
-            if self.bodies[index].is_rejected {
-                self.contacts.restart(index);
-                self.bodies[index].reject_step();
-            }
-        }
-        for _ in 0..FALLBACK_ROUNDS {
-            self.contacts.scatter_changes(&mut self.bodies);
-            // What is left of the step's would leave between rigid shapes what makes energy.
-            self.contacts.renew_budget();
-            let own = Factors { cache: context.factors, newton: &self.newton_factors };
-            for (index, body) in self.bodies.iter_mut().enumerate() {
-                let factor = own.of(index, body);
-                if body.is_rejected {
-                    body.begin_rigid_fallback(factor);
-                } else {
-                    body.trial.x.clone_from(&body.current.x);
-                    body.contact_step(factor);
-                }
-            }
-            self.contacts.outdate(Change::Contacts);
-            self.solve_contacts(context);
-            let mut turned = false;
-            for body in &mut self.bodies {
-                if body.is_rejected {
-                    turned |= body.finish_rigid_fallback();
-                } else {
-                    body.bend_step_to_rotation();
-                    body.evaluate_trial();
-                    body.accept_trial();
-                }
-            }
-            if !turned {
-                break;
-            }
-        }
-    }
-
     /// One iteration.
     fn iterate(&mut self, context: &SolveContext<'_>) -> Outcome {
         self.refresh(context);
@@ -341,7 +265,7 @@ impl Island {
 
     /// Solves the contacts at the trial positions and moves the bodies to what comes of it; again for those
     /// that were thought to stay open and did not.
-    fn solve_contacts(&mut self, context: &SolveContext<'_>) {
+    pub(super) fn solve_contacts(&mut self, context: &SolveContext<'_>) {
         let heaviest = self.bodies.iter().map(|b| b.weight).fold(0.0, f64::max);
         let tolerance = ConeTolerance {
             relative: self.bodies.iter().map(|b| b.settings.contact_tolerance).fold(f64::INFINITY, f64::min),

@@ -16,6 +16,7 @@ pub(crate) mod cone;
 pub(crate) mod constraints;
 
 mod island;
+mod rejected_steps;
 
 #[cfg(test)]
 mod cone_tests;

@@ -11,16 +11,14 @@ use crate::body::{
     DeformableAttachment, DeformableBody, DeformableBodyHandle, DeformableBodySet, DeformableContact,
     DeformablePairContact, DeformableState, Integrator, is_number,
 };
-use crate::coupling::{StepContext, carried_nodes};
+use crate::coupling::StepContext;
 use crate::pipeline::DeformableCounters;
-use crate::solver::{BodyProblem, ROUNDING, Reaction};
+use crate::solver::{BodyProblem, ROUNDING};
 use rapier3d::math::Vector;
 
 impl StepScratch {
     pub(super) fn advance(&mut self, deformables: &mut DeformableBodySet, h: f64) {
         deformables.reset_attachment_forces();
-        self.reaction_list.clear();
-        self.reaction_list.resize(self.scene.proxies.list.len(), Reaction::default());
         for work in &mut self.islands {
             let finite = work.is_finite();
             for (local, &index) in work.members.iter().enumerate() {
@@ -33,6 +31,7 @@ impl StepScratch {
                     body.report.is_rejected = problem.is_rejected;
                     body.state.pair_data.clone_from(&self.works[index].pair_data);
                     self.works[index].tunnelling.stop(body, problem.is_rejected, h);
+                    self.works[index].carried.put(body);
                     self.counters.rejected_steps += usize::from(problem.is_rejected);
                     give_forces(&work.island.bodies[local], deformables);
                 } else if !work.island.bodies[local].current.x.iter().all(is_number) {
@@ -40,8 +39,6 @@ impl StepScratch {
                 }
             }
             if finite {
-                let contacts = &work.island.contacts;
-                contacts.add_reactions(&self.scene.proxies, h, &mut self.reaction_list);
                 let handle_of = |local: usize| self.works[work.members[local]].handle;
                 list_contacts(work, handle_of, &mut self.contacts);
                 list_pair_contacts(work, handle_of, &mut self.pair_contacts);
@@ -57,30 +54,6 @@ impl StepScratch {
         let forces = self.contacts.iter().map(|c| c.force).chain(self.pair_contacts.iter().map(|c| c.force));
         self.counters.active_contacts = forces.filter(|force| *force != Vector::ZERO).count();
         self.idle.extend(self.works.drain(..).map(|work| (work.handle, work)));
-    }
-
-    /// Puts nodes that are held fast to rigid bodies where those take them: what is attached turns with its body to the last digit. The
-    /// solve has brought them there but for the turn that the step itself has added.
-    pub(super) fn carry_attached(&mut self, deformables: &mut DeformableBodySet, context: &StepContext<'_>) {
-        /// In mean edges of the surface: what is farther off was put elsewhere by its user, and comes in the next steps.
-        const CARRIED: f64 = 1.0;
-        /// Error of the contact forces beyond which the solve has not brought nodes to their places: at 0.1 a bar of 1e8 Pa around a core of
-        /// steel that lands has 39 times its energy for a step.
-        const LEFT_OFF: f64 = 1e-3;
-        self.carried.clear();
-        carried_nodes(deformables, &mut self.scene, context, &self.reaction_list, &mut self.carried);
-        for own in self.carried.chunk_by(|a, b| a.0 == b.0) {
-            let handle = own[0].0;
-            let Some(body) = deformables.get_mut(handle).filter(|_| self.places.contains_key(&handle)) else {
-                continue;
-            };
-            let far = CARRIED * body.model.surface.mean_edge;
-            let near = own.iter().all(|(_, node, end)| (body.state.x[*node as usize] - end).norm() <= far);
-            // What was rejected keeps its shape, and what is far from solved would be strained.
-            if near && !body.report.is_rejected && body.report.contact_error <= LEFT_OFF {
-                own.iter().for_each(|(_, node, end)| body.state.x[*node as usize] = *end);
-            }
-        }
     }
 
     /// Lets islands fall asleep that have been still.
@@ -147,7 +120,6 @@ pub(super) fn store(
         work.memory_of_links(h, &mut body.state.shared);
     }
     body.report.iterations = work.island.report.iterations;
-    body.report.contact_error = work.island.report.contacts.error;
     body.report.residual = problem.residual();
     body.report.tolerance = problem.settings.tolerance.max(ROUNDING) * problem.force_scale();
     body.report.guard_retries = problem.guard_retries;

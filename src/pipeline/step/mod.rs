@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! read_obstacles → sense → wake → predict → detect → detect_soft_pairs → attach → walk_neighbourhood →
-//! choose_integration_order → prepare_factors → form_islands → solve → stop_tunnelling → advance → carry_attached → fall_asleep →
+//! choose_integration_order → prepare_factors → form_islands → solve → stop_tunnelling → carry_attached → advance → fall_asleep →
 //! tell_events → hand over reactions → (rapier steps) → after_step
 //! ```
 
@@ -19,6 +19,7 @@ mod soft_pairs;
 
 mod scratch;
 
+mod carry;
 mod detect;
 mod factors;
 mod finish;

@@ -72,8 +72,8 @@ impl StepScratch {
         self.solve(&limits, context.h);
         self.counters.solve_time = clock.lap();
         self.stop_tunnelling(&limits, context.h);
+        self.carry_attached(deformables, context, &limits);
         self.advance(deformables, context.h);
-        self.carry_attached(deformables, context);
         self.fall_asleep(deformables, context);
         self.tell_events(deformables, context);
         self.counters.advance_time = clock.lap();

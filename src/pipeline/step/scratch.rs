@@ -37,6 +37,7 @@ pub(in crate::pipeline) struct StepScratch {
     pub(super) prescribed: Vec<(DeformableBodyHandle, PrescribedNode)>,
     /// Nodes that attachments hold fast to rigid bodies.
     pub(super) attached: Vec<(DeformableBodyHandle, ProxyId, u32)>,
+    /// Bodies, and what they are attached to and do not collide with.
     pub(super) parted: Vec<(DeformableBodyHandle, ProxyId)>,
     /// Nodes that rigid bodies carry, and to where.
     pub(super) carried: Vec<(DeformableBodyHandle, u32, Vec3)>,

@@ -1,6 +1,7 @@
 //! What the pipeline keeps per body from step to step: memory only. Results depend on none of it, but that a body put
 //! aside goes back to where its last step left it.
 
+use super::carry::CarriedNodes;
 use super::tunnelling::TunnellingStops;
 use crate::body::{
     ConstraintKey, ConstraintMemory, DeformableAttachmentHandle, DeformableBody, DeformableBodyHandle,
@@ -50,6 +51,7 @@ pub(super) struct BodyWork {
     pub has_neighbours: bool,
     tree: SurfaceTree,
     pub tunnelling: TunnellingStops,
+    pub carried: CarriedNodes,
 }
 
 /// How far a body that touches nothing looks ahead \[s\].
@@ -79,6 +81,7 @@ impl BodyWork {
             has_neighbours: false,
             tree: SurfaceTree::default(),
             tunnelling: TunnellingStops::default(),
+            carried: CarriedNodes::default(),
         }
     }
 

@@ -4,6 +4,10 @@ use crate::contact::{Endpoint, ProxyId};
 use crate::math::{Mat3, Pose64, Vec3, rotation_from_vector, rotation_vector};
 use nalgebra::{Matrix6, Vector6};
 
+/// Turn in a step \[rad\] up to which attached points follow arcs. Of 90 bars around rigid cores that were thrown on a floor at up to
+/// 17 rad/s, with arcs of any size two made energy when their steps were rejected; those turned by 0.4 and 0.6.
+const LARGEST_ARC: f64 = 0.2;
+
 /// Linear and angular part of a motion; the linear one is of the centre of mass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Twist {
@@ -149,35 +153,40 @@ impl RigidProxies {
         match proxy {
             RigidProxy::Prescribed { start, end } => prescribed(endpoint, start, end),
             RigidProxy::Rigid { free, .. } | RigidProxy::Link { free, .. } => {
-                let gained = self.gained(proxy, id, reactions);
-                let twist =
-                    Twist { linear: free.linear + gained.linear, angular: free.angular + gained.angular };
-                proxy.at(endpoint, &twist) * h
+                proxy.at(endpoint, &self.end_twist(id, free, reactions)) * h
             }
         }
     }
 
+    /// Motion of a proxy at the end of the step, that without contact being `free`.
+    fn end_twist(&self, id: ProxyId, free: &Twist, reactions: &[Reaction]) -> Twist {
+        let gained = self.gained(self.get(id), id, reactions);
+        Twist { linear: free.linear + gained.linear, angular: free.angular + gained.angular }
+    }
+
     /// What the arc of a yielding body's point over a step of `h` \[s\] has beyond the straight way of [`Self::displacement`], as the body
-    /// turns at its start \[m\]: towards the axis, `(ω h)² r / 2`.
+    /// turns at its start \[m\]: towards the axis, `(ω h)² r / 2`. Zero of large turns.
     pub fn sagitta(&self, endpoint: &Endpoint, h: f64) -> Vec3 {
         let Endpoint::Rigid { proxy, point } = endpoint else { return Vec3::zeros() };
         let proxy = self.get(*proxy);
         match proxy {
-            RigidProxy::Prescribed { .. } => Vec3::zeros(),
-            RigidProxy::Rigid { free, .. } | RigidProxy::Link { free, .. } => {
+            RigidProxy::Rigid { free, .. } | RigidProxy::Link { free, .. }
+                if free.angular.norm() * h <= LARGEST_ARC =>
+            {
                 let (turn, arm) = (free.angular * h, point - proxy.com());
                 rotation_from_vector(&turn) * arm - arm - turn.cross(&arm)
             }
+            _ => Vec3::zeros(),
         }
     }
 
-    /// Where a point of a yielding body is at the end of a step of `h` \[s\] under reactions \[m\], its turn exact; `None` of others.
-    pub fn end_of(&self, id: ProxyId, point: &Vec3, reactions: &[Reaction], h: f64) -> Option<Vec3> {
+    /// Where a yielding body takes its points in a step of `h` \[s\] under reactions \[m\], its turn exact; `None` of others.
+    pub fn carries(&self, id: ProxyId, reactions: &[Reaction], h: f64) -> Option<impl Fn(&Vec3) -> Vec3> {
         let proxy = self.get(id);
         let (RigidProxy::Rigid { free, .. } | RigidProxy::Link { free, .. }) = proxy else { return None };
-        let gained = self.gained(proxy, id, reactions);
-        let turn = rotation_from_vector(&((free.angular + gained.angular) * h));
-        Some(proxy.com() + (free.linear + gained.linear) * h + turn * (point - proxy.com()))
+        let (twist, com) = (self.end_twist(id, free, reactions), proxy.com());
+        let turn = rotation_from_vector(&(twist.angular * h));
+        Some(move |point: &Vec3| com + twist.linear * h + turn * (point - com))
     }
 
     /// As [`Self::displacement`], of what the reactions add alone.

@@ -7,7 +7,7 @@
 use super::coarse_space::CoarseSpace;
 use super::context::SolveContext;
 use super::delassus::Delassus;
-use super::gaps::relative_motion;
+use super::gaps::{motion, relative_motion};
 use super::groups::ContactGroups;
 use super::lists::{ActiveContact, Candidate, ContactResult};
 use super::matrix_free::Response;
@@ -155,22 +155,35 @@ impl ContactSystem {
         reactions
     }
 
-    /// What the contacts of a body have put into all that they touch \[J\]: work on both of their sides, with the bodies
-    /// at their current positions. Closing contacts and friction take some.
-    pub fn made_energy(&mut self, index: usize, bodies: &[BodyProblem], context: &SolveContext<'_>) -> f64 {
+    /// What the contacts and hard attachments of a body have put into all that they touch \[J\], with the bodies at their current
+    /// positions: work on both of their sides, and the amount on one. Closing contacts and friction take some; attachments that are
+    /// solved make none, but by what brings together what was apart.
+    pub fn work_of(&mut self, index: usize, bodies: &[BodyProblem], context: &SolveContext<'_>) -> [f64; 2] {
         let reactions = self.collect_reactions(context);
-        let mut sum = 0.0;
-        for contact in &self.active {
+        let [mut made, mut exchanged] = [0.0; 2];
+        let at = |body: usize| &bodies[body].current.x[..];
+        let counts = |c: &Constraint| matches!(c.law, Law::Contact { .. }) || c.is_hard_hold();
+        for contact in self.active.iter().filter(|contact| counts(&contact.constraint)) {
             let constraint = &contact.constraint;
-            let is_contact = matches!(constraint.law, Law::Contact { .. });
-            if is_contact && constraint.endpoints.iter().any(|endpoint| endpoint.is_of(index)) {
-                let at = |body: usize| &bodies[body].current.x[..];
-                let moved = relative_motion(constraint, bodies, at, context, &reactions);
-                sum += contact.force(&self.lambda).dot(&moved);
+            if constraint.all_endpoints().any(|endpoint| endpoint.is_of(index)) {
+                let force = contact.force(&self.lambda);
+                made += force.dot(&relative_motion(constraint, bodies, at, context, &reactions));
+                exchanged +=
+                    force.dot(&motion(&constraint.endpoints[0], bodies, at, context, &reactions)).abs();
             }
         }
         self.reactions = reactions;
-        sum
+        [made, exchanged]
+    }
+
+    /// Multiplies the forces on a body.
+    pub fn weaken(&mut self, index: usize, by: f64) {
+        for contact in &self.active {
+            if contact.constraint.all_endpoints().any(|endpoint| endpoint.is_of(index)) {
+                self.lambda[contact.rows()].iter_mut().for_each(|force| *force *= by);
+            }
+        }
+        self.outdate(Change::Forces);
     }
 
     /// Begins anew with what acts on a body, and with what is between rigid bodies: without forces, and so that nothing
@@ -255,8 +268,13 @@ fn keep_together(constraint: &mut Constraint, index: usize) {
     if constraint.compliance != 0.0 || !constraint.all_endpoints().any(is_own) {
         return;
     }
-    let is_bilateral = matches!(constraint.law, Law::Bounded { least, .. } if least < 0.0);
-    constraint.target_gap = if is_bilateral { 0.0 } else { constraint.target_gap.max(0.0) };
+    if constraint.law.is_bilateral() {
+        constraint.target_gap = 0.0;
+        // Of an attachment to what turns: in a straight step the other side goes straight, too.
+        constraint.surface_motion = Vec3::zeros();
+    } else {
+        constraint.target_gap = constraint.target_gap.max(0.0);
+    }
     // Within a rigid shape nothing moves, and W would be zero there.
     if constraint.endpoints.iter().all(is_own) {
         constraint.compliance = WITHIN_A_SHAPE;

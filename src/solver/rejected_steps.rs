@@ -1,0 +1,118 @@
+//! Steps of an island that would make energy: their bodies keep their shape and move as rigid ones.
+
+use super::body_step::Factors;
+use super::constraints::{Change, SolveContext};
+use super::island::{FAR_FROM_SOLVED, Island};
+
+/// Contact problems of rejected steps, at the most, until contacts turn them no more.
+const FALLBACK_ROUNDS: usize = 4;
+/// Factors on the forces of a rejected step that makes energy, one after the other.
+const WEAKER: [f64; 5] = [0.5, 0.5, 0.5, 0.5, 0.0];
+/// Part of the work that forces carry from one thing to another which they may make.
+const MADE_OF_EXCHANGED: f64 = 1.0e-3;
+
+impl Island {
+    /// Bodies whose step is far from solved and would gain energy are rejected: where forces change wildly from iteration
+    /// to iteration, what they have done to a body is not what the last ones take from others.
+    pub fn reject_steps_that_gain_energy(&mut self, context: &SolveContext<'_>) {
+        loop {
+            let mut gains = false;
+            for index in 0..self.bodies.len() {
+                if self.would_be_rejected(index, context) {
+                    self.bodies[index].is_rejected = true;
+                    gains = true;
+                }
+            }
+            if !gains {
+                break;
+            }
+            self.step_rigid_fallbacks(context);
+        }
+    }
+
+    pub(super) fn would_be_rejected(&mut self, index: usize, context: &SolveContext<'_>) -> bool {
+        let body = &self.bodies[index];
+        let is_solved = self.contacts.work.error <= FAR_FROM_SOLVED
+            && body.residual() <= FAR_FROM_SOLVED * body.force_scale();
+        !is_solved && self.would_gain_energy(index, 0.0, context)
+    }
+
+    /// Whether a body's step makes energy, with what its contacts make and `besides` \[J\]; not if it was rejected.
+    pub fn would_gain_energy(&mut self, index: usize, besides: f64, context: &SolveContext<'_>) -> bool {
+        if self.bodies[index].is_rejected {
+            return false;
+        }
+        let by_contacts = self.contacts.work_of(index, &self.bodies, context)[0];
+        self.bodies[index].gains_energy(by_contacts.max(0.0) + besides)
+    }
+
+    /// Moves bodies whose step was rejected as rigid ones, with contacts solved anew; again about where those have turned one.
+    pub fn step_rigid_fallbacks(&mut self, context: &SolveContext<'_>) {
+        for index in 0..self.bodies.len() {
+            if self.bodies[index].is_rejected {
+                self.contacts.restart(index);
+                self.bodies[index].reject_step();
+            }
+        }
+        for _ in 0..FALLBACK_ROUNDS {
+            if !self.step_rigid_fallbacks_once(true, context) {
+                break;
+            }
+        }
+        self.weaken_what_makes_energy(context);
+    }
+
+    /// Steps rejected bodies as rigid ones, the others under what has changed of their contact forces, with these solved or as they are. True
+    /// if one has turned so far that contacts miss by it.
+    fn step_rigid_fallbacks_once(&mut self, solves: bool, context: &SolveContext<'_>) -> bool {
+        self.contacts.scatter_changes(&mut self.bodies);
+        // What is left of the step's would leave between rigid shapes what makes energy.
+        self.contacts.renew_budget();
+        let own = Factors { cache: context.factors, newton: &self.newton_factors };
+        for (index, body) in self.bodies.iter_mut().enumerate() {
+            let factor = own.of(index, body);
+            if body.is_rejected {
+                body.begin_rigid_fallback(factor);
+            } else {
+                body.trial.x.clone_from(&body.current.x);
+                body.contact_step(factor);
+            }
+        }
+        if solves {
+            self.contacts.outdate(Change::Contacts);
+            self.solve_contacts(context);
+        }
+        let mut turned = false;
+        for body in &mut self.bodies {
+            if body.is_rejected {
+                turned |= body.finish_rigid_fallback();
+            } else {
+                body.bend_step_to_rotation();
+                body.evaluate_trial();
+                body.accept_trial();
+            }
+        }
+        turned
+    }
+
+    /// Weakens the forces on rejected bodies until they make no energy. Between rigid shapes what is solved makes none, but hundreds of
+    /// attached vertices may end unsolved.
+    fn weaken_what_makes_energy(&mut self, context: &SolveContext<'_>) {
+        for weaker in WEAKER {
+            let mut makes = false;
+            for index in 0..self.bodies.len() {
+                if self.bodies[index].is_rejected {
+                    let [made, exchanged] = self.contacts.work_of(index, &self.bodies, context);
+                    if made > MADE_OF_EXCHANGED * exchanged {
+                        self.contacts.weaken(index, weaker);
+                        makes = true;
+                    }
+                }
+            }
+            if !makes {
+                break;
+            }
+            self.step_rigid_fallbacks_once(false, context);
+        }
+    }
+}
