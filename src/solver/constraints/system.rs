@@ -176,6 +176,12 @@ impl ContactSystem {
         [made, exchanged]
     }
 
+    /// Whether something holds a body fast.
+    pub fn has_hard_holds(&self, index: usize) -> bool {
+        let is_own = |constraint: &Constraint| constraint.all_endpoints().any(|e| e.is_of(index));
+        self.active.iter().map(|contact| &contact.constraint).any(|c| c.is_hard_hold() && is_own(c))
+    }
+
     /// Multiplies the forces on a body.
     pub fn weaken(&mut self, index: usize, by: f64) {
         for contact in &self.active {
