@@ -18,6 +18,9 @@ fn bar(modulus: f64) -> DeformableBodyBuilder {
 
 /// The largest change of a distance between vertices, over the longest.
 fn distortion(body: &DeformableBody, vertices: &[usize]) -> f64 {
+    if vertices.is_empty() {
+        return 0.0;
+    }
     let x: Vec<[f64; 3]> = vertices.iter().map(|&v| body.position(v).unwrap()).collect();
     let at_rest: Vec<[f64; 3]> = vertices.iter().map(|&v| body.model().rest_position(v)).collect();
     let length = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
@@ -85,6 +88,7 @@ fn mass_and_inertia_are_those_of_the_solid() {
 
 #[test]
 fn an_insert_moves_rigidly_thrown_and_dropped() {
+    let mut all_unsolved = 0;
     for (modulus, dt) in [(1e4, 1.0 / 60.0), (1e6, 1.0 / 60.0), (1e8, 1.0 / 60.0), (1e6, 1e-3), (1e6, 0.05)] {
         let (mut physics, floor) = world_with_floor(dt);
         let mut world = DeformableWorld::new();
@@ -97,11 +101,13 @@ fn an_insert_moves_rigidly_thrown_and_dropped() {
             energy_of_all(&world.bodies[body], &[&physics.bodies[bones[0].body]])
         };
         let (mut start, mut most) = (f64::NAN, 0.0f64);
+        let mut factorizations = 0;
         let mut touched = false;
         // It lands after 0.26 s.
         let seconds = if dt < 2e-3 { 0.4 } else { 1.0 };
         for step in 0..(seconds / dt) as usize {
             world.step(&mut physics);
+            factorizations += world.counters().contact_factorizations;
             let own = &world.bodies[body];
             touched |= world.contact_force(body, floor) != Vector::ZERO;
             // Rapier gives its bodies their masses in their first step.
@@ -123,14 +129,16 @@ fn an_insert_moves_rigidly_thrown_and_dropped() {
             }
         }
         println!(
-            "{modulus:e} Pa, {dt} s: distortion {worst:.1e}, off the bone {off:.1e} m, energy at most {most:.4} of the start, {unsolved} unsolved steps with {left:.1e}"
+            "{modulus:e} Pa, {dt} s: distortion {worst:.1e}, off the bone {off:.1e} m, energy at most {most:.4} of the start, {unsolved} unsolved steps with {left:.1e}, {factorizations} factorizations"
         );
         assert!(touched && worst < 1e-9, "{worst:e}");
         assert!(most < 1.005, "{most}");
         // Rapier turns it in substeps, and gyroscopically.
         let near = if dt > 0.04 { 6e-3 } else { 3e-3 };
-        assert!(off < near && unsolved <= 16, "{off:e} {unsolved}");
+        assert!(off < near && unsolved <= 3, "{off:e} {unsolved}");
+        all_unsolved += unsolved;
     }
+    assert!(all_unsolved <= 6, "{all_unsolved}");
 }
 
 #[test]
@@ -328,9 +336,17 @@ fn what_cannot_be_rigid_says_why() {
     assert_eq!((physics.bodies.len(), world.bodies.iter().count()), (0, 0));
 }
 
-/// A bar with a core, or with a block glued to either end, thrown on a floor in one of many ways. The most that its energy comes to over
-/// that after the first step.
-fn most_energy_of_a_throw(seed: u64, has_core: bool) -> f64 {
+/// What became of a throw.
+struct Throw {
+    /// The most that its energy comes to over that after the first step.
+    most: f64,
+    /// Steps that were solved, and those of them in which a core was off by more than 1e-9 of its length.
+    solved: usize,
+    off: usize,
+}
+
+/// A bar with a core, or with a block glued to either end, thrown on a floor in one of many ways.
+fn throw(seed: u64, has_core: bool) -> Throw {
     let mut random = Random(seed * 7919 + 17);
     (0..5).for_each(|_| _ = random.unit());
     let modulus = 10f64.powi(4 + random.below(6) as i32);
@@ -366,19 +382,27 @@ fn most_energy_of_a_throw(seed: u64, has_core: bool) -> f64 {
     // Rapier gives its bodies their masses in their first step.
     world.step(&mut physics);
     let start = energy(&world, &physics);
-    let energies = (0..(1.2 / dt) as usize).map(|_| {
+    let core = if has_core { attached(&world.bodies[body]) } else { Vec::new() };
+    let mut found = Throw { most: 0.0, solved: 0, off: 0 };
+    for _ in 0..(1.2 / dt) as usize {
         world.step(&mut physics);
-        energy(&world, &physics) / start
-    });
-    // NaN is no largest number: it is told.
-    energies.fold(0.0, |most: f64, now| if now.is_nan() { f64::INFINITY } else { most.max(now) })
+        let now = energy(&world, &physics) / start;
+        // NaN is no largest number: it is told.
+        found.most = if now.is_nan() { f64::INFINITY } else { found.most.max(now) };
+        let own = &world.bodies[body];
+        if !own.last_step_rejected() && world.counters().contact_error <= 1e-3 {
+            found.solved += 1;
+            found.off += usize::from(distortion(own, &core) > 1e-9);
+        }
+    }
+    found
 }
 
 /// Seeds 1 to 3 made 1e25, 1e13 and 364 times their energy while arcs of attached points took the turn of the step's start.
 #[test]
 fn random_throws_make_no_energy() {
     for seed in 0..4 {
-        let most = [true, false].map(|has_core| most_energy_of_a_throw(seed, has_core));
+        let most = [true, false].map(|has_core| throw(seed, has_core).most);
         println!("throw {seed}: {most:.4?} of the start");
         assert!(most.iter().all(|most| *most < 1.01), "{seed} {most:?}");
     }
@@ -386,9 +410,13 @@ fn random_throws_make_no_energy() {
 
 #[test]
 #[ignore = "slow tier"]
-fn more_random_throws_make_no_energy() {
-    for seed in 4..12 {
-        let most = [true, false].map(|has_core| most_energy_of_a_throw(seed, has_core));
-        assert!(most.iter().all(|most| *most < 1.01), "{seed} {most:?}");
+fn more_random_throws_make_no_energy_and_keep_cores_rigid_in_most_steps() {
+    let (mut solved, mut off) = (0, 0);
+    for seed in 4..16 {
+        let thrown = [true, false].map(|has_core| throw(seed, has_core));
+        assert!(thrown.iter().all(|thrown| thrown.most < 1.01), "{seed}");
+        (solved, off) = (solved + thrown[0].solved, off + thrown[0].off);
     }
+    println!("{off} of {solved} solved steps leave a core off by more than 1e-9 of its length");
+    assert!(solved > 500 && off < solved / 128, "{off} of {solved}");
 }

@@ -120,6 +120,12 @@ impl Constraint {
         self.path.is_empty() && self.compliance == 0.0 && self.law.is_bilateral()
     }
 
+    /// Whether it holds a point of a deformable body, pulling or pushing, with any force.
+    pub fn holds_deformable(&self) -> bool {
+        let is_soft = |endpoint: &Endpoint| matches!(endpoint, Endpoint::Soft { .. });
+        self.path.is_empty() && self.law == Law::BILATERAL && self.endpoints.iter().any(is_soft)
+    }
+
     /// Everything that it acts on.
     pub fn all_endpoints(&self) -> impl Iterator<Item = &Endpoint> + Clone {
         self.endpoints.iter().chain(self.path.iter().map(|point| &point.endpoint))

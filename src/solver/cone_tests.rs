@@ -11,12 +11,12 @@ use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
 /// 1e-12 is what rounding leaves of forces that come of gaps over R = 1e-4 W.
-const TOLERANCE: ConeTolerance = ConeTolerance { relative: 1e-11, floor: 1e-6 };
+pub(super) const TOLERANCE: ConeTolerance = ConeTolerance { relative: 1e-11, floor: 1e-6 };
 /// Proximal parameter of a solve.
 const EPSILON: f64 = 1e-4;
 
 /// Numbers of a linear congruence [Knuth].
-struct Numbers(u64);
+pub(super) struct Numbers(pub u64);
 
 impl Numbers {
     fn between(&mut self, low: f64, high: f64) -> f64 {
@@ -31,7 +31,8 @@ impl Numbers {
 
 /// How a contact ends up in a solution.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum End {
+pub(super) enum End {
+    Held,
     Open,
     Closed,
     Stick,
@@ -40,16 +41,17 @@ enum End {
     AtLimit,
 }
 
-const ENDS: [End; 6] = [End::Open, End::Closed, End::Stick, End::Slip, End::Bilateral, End::AtLimit];
+pub(super) const ENDS: [End; 6] =
+    [End::Open, End::Closed, End::Stick, End::Slip, End::Bilateral, End::AtLimit];
 
 /// A problem whose solution, with every inequality strict, is known.
-struct Case {
+pub(super) struct Case {
     /// Between bodies in groups, as W has it.
-    grouped: ConeProblem,
+    pub grouped: ConeProblem,
     /// The same in one group.
     dense: ConeProblem,
     W: DMatrix<f64>,
-    solution: Vec<f64>,
+    pub solution: Vec<f64>,
 }
 
 /// Law, force and gap of an end. The gap of what slips is along (μ, −t): perpendicular to its force.
@@ -60,6 +62,7 @@ fn complementary(end: End, numbers: &mut Numbers) -> (Law, Vec<f64>, Vec<f64>) {
     let (sin, cos) = numbers.between(0.0, std::f64::consts::TAU).sin_cos();
     let (contact, free) = (Law::Contact { friction }, Law::BILATERAL);
     match end {
+        End::Held => (free, vec![sign * force], vec![0.0]),
         End::Open => (contact, vec![0.0; 3], vec![gap, 0.3 * gap * cos, 0.3 * gap * sin]),
         End::Closed => (Law::Contact { friction: 0.0 }, vec![force], vec![0.0]),
         End::Stick => {
@@ -79,9 +82,20 @@ fn complementary(end: End, numbers: &mut Numbers) -> (Law, Vec<f64>, Vec<f64>) {
 impl Case {
     /// Groups of contacts between some of `bodies` bodies of six coordinates each.
     fn new(groups: usize, bodies: usize, ends: &[End], numbers: &mut Numbers) -> Self {
+        Self::with_holds([0, groups], bodies, ends, numbers)
+    }
+
+    /// The same after so many groups of what holds with any force.
+    pub fn with_holds(
+        [holds, contacts]: [usize; 2],
+        bodies: usize,
+        ends: &[End],
+        numbers: &mut Numbers,
+    ) -> Self {
         let (mut offsets, mut starts, mut laws) = (vec![0], vec![0], Vec::new());
         let (mut solution, mut gaps, mut rows) = (Vec::new(), Vec::new(), Vec::new());
-        for _ in 0..groups {
+        for group in 0..holds + contacts {
+            let ends = if group < holds { &[End::Held] } else { ends };
             let first = numbers.below(bodies);
             let pair = [first, (first + 1 + numbers.below(bodies - 1)) % bodies];
             for _ in 0..1 + numbers.below(3) {
@@ -108,7 +122,7 @@ impl Case {
     }
 
     /// How far forces may be from the solution that are left as they are: at a residual of a hundred tolerances.
-    fn allowed(&self) -> f64 {
+    pub fn allowed(&self) -> f64 {
         let (_, R) = regularised(&self.dense, &self.W);
         let eigenvalues = self.W.clone().symmetric_eigenvalues();
         let condition = (eigenvalues.max() + largest(&R)) / eigenvalues.min();
@@ -124,7 +138,7 @@ impl Case {
         (0..self.solution.len()).map(of).collect()
     }
 
-    fn error(&self, lambda: &[f64]) -> f64 {
+    pub fn error(&self, lambda: &[f64]) -> f64 {
         lambda.iter().zip(&self.solution).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
     }
 }
@@ -160,6 +174,7 @@ fn problem(W: &DMatrix<f64>, offsets: &[usize], laws: &[Law], groups: Vec<usize>
         offsets: offsets.to_vec(),
         laws: laws.to_vec(),
         W: blocks,
+        whole_diagonal: Vec::new(),
         groups,
         filled: lower(&adjacent),
         version: 1,

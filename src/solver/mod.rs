@@ -19,6 +19,8 @@ mod island;
 mod rejected_steps;
 
 #[cfg(test)]
+mod condensation_tests;
+#[cfg(test)]
 mod cone_tests;
 #[cfg(test)]
 mod gradient_tests;

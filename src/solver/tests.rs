@@ -312,6 +312,7 @@ pub(super) fn random_problem(contacts: usize, rank: usize, mu: f64, numbers: &[f
         laws: vec![Law::Contact { friction: mu }; contacts],
         version: 0,
         W: block(W.as_slice(), m),
+        whole_diagonal: Vec::new(),
         groups: vec![0, contacts],
         filled: vec![(0, 0)],
         g: g.as_slice().to_vec(),

@@ -16,8 +16,11 @@ mod projected_gradient;
 
 mod sweeps;
 
+mod condensation;
+
 mod secant;
 
+pub(crate) use condensation::{Condensation, Condensed};
 pub(crate) use metric::{ConeMetric, MetricContact, MetricSide, Modes, STILL};
 pub(crate) use projected_gradient::{ConeOperator, ProjectedGradient};
 

@@ -19,11 +19,6 @@ use crate::contact::Law;
 const NEARLY: f64 = 1.0e-2;
 /// Newton steps that a warm start may take before continuation begins.
 const WARM_STEPS: usize = 4;
-/// Forces are left as they are at the start if they are no worse than the tolerance times this. A
-/// hundred times more, and a symmetric stack of 1000:1 begins to sway.
-const AS_GOOD: f64 = 100.0;
-/// Largest error of forces that are left as they are, where the tolerance is below it.
-const GOOD: f64 = 1.0e-6;
 /// Error of a warm start, after the active-set predictor, from which on continuation begins at once.
 const TOO_FAR: f64 = 0.2;
 /// Accuracy of the stages below the last.
@@ -176,7 +171,7 @@ impl ConeSolver {
         self.Wz.extend_from_slice(W_lambda);
         self.project(problem);
         let scale = largest(self.gamma.iter().copied()).max(tolerance.floor);
-        let enough = (AS_GOOD * tolerance.relative).min(tolerance.relative.max(GOOD));
+        let enough = tolerance.good_enough();
         (0..problem.contacts()).all(|i| {
             let rows = problem.offsets[i]..problem.offsets[i + 1];
             let error = largest(rows.map(|k| lambda[k] - self.gamma[k]));
@@ -309,7 +304,7 @@ impl ConeSolver {
     }
 
     fn set_regularisation(&mut self, problem: &ConeProblem, epsilon: f64) {
-        problem.W.diagonal(&mut self.diagonal);
+        problem.diagonal(&mut self.diagonal);
         self.R.clear();
         for i in 0..problem.contacts() {
             let rows = problem.offsets[i]..problem.offsets[i + 1];

@@ -11,6 +11,9 @@ pub(crate) struct ConeProblem {
     pub laws: Vec<Law>,
     /// Delassus operator [m/N], symmetric.
     pub W: BlockMatrix,
+    /// Diagonal of what W was condensed from, by which regularisation is scaled; empty if it was not. Beside what is held W itself may
+    /// be no more than rounding.
+    pub whole_diagonal: Vec<f64>,
     /// First contact of each block, and the number of contacts last.
     pub groups: Vec<usize>,
     /// Pairs of blocks of W that its factor may fill.
@@ -33,6 +36,12 @@ const UNLIKE: f64 = 2.0e3;
 /// The least part of it.
 const LEAST: f64 = 0.1;
 
+/// Forces are left as they are at the start if they are no worse than the tolerance times this. A
+/// hundred times more, and a symmetric stack of 1000:1 begins to sway.
+const AS_GOOD: f64 = 100.0;
+/// Largest error of forces that are left as they are, where the tolerance is below it.
+const GOOD: f64 = 1.0e-6;
+
 /// How hard to try.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ConeTolerance {
@@ -52,6 +61,23 @@ pub(crate) struct ConeWork {
     pub error: f64,
 }
 
+impl ConeWork {
+    /// Counts another solve of the same problem.
+    pub fn add(&mut self, other: &Self) {
+        self.newton_steps += other.newton_steps;
+        self.factorizations += other.factorizations;
+        self.failures += other.failures;
+        self.error = other.error;
+    }
+}
+
+impl ConeTolerance {
+    /// Error of forces that are left as they are.
+    pub fn good_enough(&self) -> f64 {
+        (AS_GOOD * self.relative).min(self.relative.max(GOOD))
+    }
+}
+
 impl ConeProblem {
     pub fn rows(&self) -> usize {
         self.offsets.last().copied().unwrap_or(0)
@@ -64,6 +90,15 @@ impl ConeProblem {
 
     pub fn contacts(&self) -> usize {
         self.laws.len()
+    }
+
+    /// What regularisation is scaled by [m/N], by rows.
+    pub fn diagonal(&self, out: &mut Vec<f64>) {
+        if self.whole_diagonal.is_empty() {
+            self.W.diagonal(out);
+        } else {
+            out.clone_from(&self.whole_diagonal);
+        }
     }
 
     /// `out = W v`.

@@ -4,7 +4,7 @@
 //! The law is Coulomb's as it stands, without De Saxcé's shift. Every force is in its cone at any time, so the method
 //! can be stopped anywhere. Sweeps go forward and backward in turn, which carries a load through a pile in one of them.
 
-use super::problem::{ConeProblem, ConeTolerance};
+use super::problem::{ConeProblem, ConeTolerance, EPSILON};
 use crate::contact::Law;
 use crate::math::dense;
 use crate::solver::linear::BlockMatrix;
@@ -108,7 +108,8 @@ impl ConeSweeps {
         for i in problem.groups[group]..problem.groups[group + 1] {
             let at = problem.offsets[i] - rows.start;
             let force = &mut lambda[problem.offsets[i]..problem.offsets[i + 1]];
-            let local = LocalProblem::new(block, rows.len(), at, force.len());
+            let least = problem.whole_diagonal.get(problem.offsets[i]).map_or(0.0, |w| EPSILON * w);
+            let local = LocalProblem::new(block, rows.len(), at, force.len(), least);
             let wanted = local.solve(force, &own[at..at + force.len()], problem.laws[i]);
             for (k, force) in force.iter_mut().enumerate() {
                 let d = wanted[k] - *force;
@@ -142,7 +143,8 @@ struct LocalProblem {
 }
 
 impl LocalProblem {
-    fn new(block: &[f64], stride: usize, at: usize, dimension: usize) -> Self {
+    /// That of a block's contact; along its normal it yields by `least` [m/N] in any case.
+    fn new(block: &[f64], stride: usize, at: usize, dimension: usize, least: f64) -> Self {
         let mut W = [[0.0; 3]; 3];
         for (r, row) in W.iter_mut().enumerate().take(dimension) {
             for (c, w) in row.iter_mut().enumerate().take(dimension) {
@@ -150,7 +152,7 @@ impl LocalProblem {
             }
         }
         // What nothing yields to: any positive number keeps it harmless.
-        W[0][0] = W[0][0].max(f64::MIN_POSITIVE.sqrt());
+        W[0][0] = W[0][0].max(least).max(f64::MIN_POSITIVE.sqrt());
         Self { W }
     }
 

@@ -127,7 +127,7 @@ impl CoarseSpace {
         }
         self.sizes.clear();
         self.sizes.resize(metric.bodies, MODES);
-        self.elimination.arrange(&self.sizes);
+        self.elimination.arrange(&self.sizes, &[]);
         self.elimination.list_filled(&mut metric.filled);
         metric.index_columns();
         for side in metric.contacts.iter_mut().flat_map(|contact| &mut contact.sides).flatten() {

@@ -10,6 +10,7 @@ pub(super) struct Elimination {
     pub order: Vec<usize>,
     /// What the order was made for.
     known: (Vec<usize>, Vec<bool>),
+    known_first: Vec<bool>,
     graph: Vec<bool>,
     eliminated: Vec<bool>,
     /// Rows of each block and of those adjacent to it, as far as they are not eliminated.
@@ -31,11 +32,14 @@ impl Elimination {
         self.graph[b * blocks + a] = true;
     }
 
-    /// Least degree first, counted in rows of these `sizes`; ties by index.
-    pub fn arrange(&mut self, sizes: &[usize]) {
-        if self.known.0 == sizes && self.known.1 == self.graph {
+    /// The blocks that come `first` before the others; of either the least degree first, counted in rows of these
+    /// `sizes`; ties by index.
+    pub fn arrange(&mut self, sizes: &[usize], first: &[bool]) {
+        if self.known.0 == sizes && self.known.1 == self.graph && self.known_first == first {
             return;
         }
+        self.known_first.clear();
+        self.known_first.extend_from_slice(first);
         self.known.0.clear();
         self.known.0.extend_from_slice(sizes);
         self.known.1.clone_from(&self.graph);
@@ -51,8 +55,9 @@ impl Elimination {
         rank.clear();
         rank.resize(blocks, 0);
         order.clear();
+        let firsts = first.iter().filter(|is_first| **is_first).count();
         for place in 0..blocks {
-            let open = (0..blocks).filter(|&b| !eliminated[b]);
+            let open = (0..blocks).filter(|&b| !eliminated[b] && (place >= firsts || first[b]));
             let Some(next) = open.min_by_key(|&b| (degrees[b], b)) else { break };
             rank[next] = place;
             order.push(next);

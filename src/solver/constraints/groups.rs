@@ -1,10 +1,18 @@
 //! Contacts in groups between the same two things, ordered so that the factor of their matrix fills in
-//! little.
+//! little, with what is condensed out of it first.
 
 use super::elimination::Elimination;
 use super::lists::ActiveContact;
 use super::rigid_proxy::RigidProxies;
 use crate::contact::{Constraint, Endpoint};
+
+/// What the constraints of a group are between.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Ends {
+    are_holds: bool,
+    /// As far as they yield.
+    things: [Option<u64>; 2],
+}
 
 /// The groups of an island's contacts and which of them know of one another.
 #[derive(Default)]
@@ -15,9 +23,14 @@ pub(crate) struct ContactGroups {
     pub coupled: Vec<(usize, usize)>,
     /// Those pairs, and those that elimination in this order adds.
     pub filled: Vec<(usize, usize)>,
-    ends: Vec<[Option<u64>; 2]>,
+    /// Groups of what holds deformable bodies fast: the first ones.
+    pub holds: usize,
+    /// Pairs of the others that are coupled, also by way of those.
+    pub condensed: Vec<(usize, usize)>,
+    ends: Vec<Ends>,
+    are_holds: Vec<bool>,
     /// The groups by their ends, ascending.
-    known: Vec<([Option<u64>; 2], usize)>,
+    known: Vec<(Ends, usize)>,
     group_of_constraint: Vec<usize>,
     sizes: Vec<usize>,
     elimination: Elimination,
@@ -28,7 +41,10 @@ impl ContactGroups {
     pub fn arrange(&mut self, contacts: &mut [ActiveContact], proxies: &RigidProxies) {
         self.find(contacts, proxies);
         self.find_adjacent();
-        self.elimination.arrange(&self.sizes);
+        self.are_holds.clear();
+        self.are_holds.extend(self.ends.iter().map(|ends| ends.are_holds));
+        self.holds = self.are_holds.iter().filter(|are_holds| **are_holds).count();
+        self.elimination.arrange(&self.sizes, &self.are_holds);
         let (group_of_constraint, rank) = (&self.group_of_constraint, &self.elimination.rank);
         let sorted = group_of_constraint.windows(2).all(|w| rank[w[0]] <= rank[w[1]]);
         if !sorted {
@@ -86,7 +102,7 @@ impl ContactGroups {
         if self.ends[a] == OF_PATHS || self.ends[b] == OF_PATHS {
             return true;
         }
-        self.ends[a].iter().flatten().any(|end| self.ends[b].contains(&Some(*end)))
+        self.ends[a].things.iter().flatten().any(|end| self.ends[b].things.contains(&Some(*end)))
     }
 
     /// Lists the pairs in the new order.
@@ -97,17 +113,46 @@ impl ContactGroups {
         coupled.clear();
         coupled.extend(self.filled.iter().filter(|&&(i, j)| i == j || self.share(order[i], order[j])));
         self.coupled = coupled;
+        self.condense();
     }
 
-    /// Multiplications and additions of one factorization, about, with three rows a contact.
+    /// Lists the pairs that are coupled when what holds is solved for.
+    fn condense(&mut self) {
+        let holds = self.holds;
+        self.condensed.clear();
+        if holds == 0 {
+            return;
+        }
+        self.condensed.extend(self.coupled.iter().filter(|&&(_, j)| j >= holds));
+        for column in self.filled.chunk_by(|a, b| a.1 == b.1).filter(|column| column[0].1 < holds) {
+            let others = column.partition_point(|&(i, _)| i < holds);
+            for (k, &(j, _)) in column[others..].iter().enumerate() {
+                self.condensed.extend(column[others + k..].iter().map(|&(i, _)| (i, j)));
+            }
+        }
+        self.condensed.sort_unstable_by_key(|&(i, j)| (j, i));
+        self.condensed.dedup();
+    }
+
+    /// Multiplications and additions of one factorization, about, with three rows a contact, of what is not condensed out.
     pub fn factor_work(&self) -> usize {
+        self.work_of_columns(|column| column >= self.holds)
+    }
+
+    /// The same of what condenses.
+    pub fn condensation_work(&self) -> usize {
+        self.work_of_columns(|column| column < self.holds)
+    }
+
+    fn work_of_columns(&self, counts: impl Fn(usize) -> bool) -> usize {
         let rows = |place: usize| 3 * self.sizes[self.elimination.order[place]];
         let column_work = |column: &[(usize, usize)]| {
             let own = rows(column[0].1);
             let below: usize = column[1..].iter().map(|(i, _)| rows(*i)).sum();
             own * own * own / 3 + own * below * (own + below)
         };
-        self.filled.chunk_by(|a, b| a.1 == b.1).map(column_work).sum()
+        let columns = self.filled.chunk_by(|a, b| a.1 == b.1);
+        columns.filter(|column| counts(column[0].1)).map(column_work).sum()
     }
 
     /// Multiplications and additions of one product, or sweep, about.
@@ -120,18 +165,19 @@ impl ContactGroups {
 }
 
 /// Constraints along paths are one group, which knows of all others: they are few, and one may run through any bodies.
-const OF_PATHS: [Option<u64>; 2] = [Some(u64::MAX); 2];
+const OF_PATHS: Ends = Ends { are_holds: false, things: [Some(u64::MAX); 2] };
 
 /// The two things that a constraint is between, as far as they yield.
-fn ends_of(constraint: &Constraint, proxies: &RigidProxies) -> [Option<u64>; 2] {
+fn ends_of(constraint: &Constraint, proxies: &RigidProxies) -> Ends {
     if !constraint.path.is_empty() {
         return OF_PATHS;
     }
-    [&constraint.endpoints[0], &constraint.endpoints[1]].map(|endpoint| match endpoint {
+    let thing = |endpoint: &Endpoint| match endpoint {
         Endpoint::Soft { body, .. } => Some(*body as u64),
         Endpoint::Rigid { proxy, .. } | Endpoint::Rotation { proxy } => {
             let group = proxies.group(*proxy);
             proxies.yields(*proxy).then(|| 1 << 32 | u64::from(group.0))
         }
-    })
+    };
+    Ends { are_holds: constraint.holds_deformable(), things: constraint.endpoints.each_ref().map(thing) }
 }

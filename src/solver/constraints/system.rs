@@ -16,7 +16,7 @@ use crate::body::ConstraintMemory;
 use crate::contact::{Constraint, Endpoint, Law};
 use crate::math::Vec3;
 use crate::solver::body_step::BodyProblem;
-use crate::solver::cone::{ConeMetric, ConeProblem, ConeSolver, ConeSweeps, ProjectedGradient};
+use crate::solver::cone::{Condensation, ConeMetric, ConeProblem, ConeSolver, ConeSweeps, ProjectedGradient};
 
 /// Contacts of the bodies of one island.
 #[derive(Default)]
@@ -64,6 +64,7 @@ pub(super) struct DenseSolve {
     pub change: Change,
     pub g_free: Vec<f64>,
     pub sweeps: ConeSweeps,
+    pub condensation: Condensation,
 }
 
 /// Projected gradients, which only multiply with it.

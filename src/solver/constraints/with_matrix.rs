@@ -6,7 +6,7 @@ use super::improve::Around;
 use super::system::{Change, ContactSystem};
 use crate::contact::Endpoint;
 use crate::solver::body_step::{BodyProblem, are_large};
-use crate::solver::cone::{ConeTolerance, Effort};
+use crate::solver::cone::{Condensed, ConeTolerance, Effort};
 use crate::threads::for_each_item;
 
 /// Solves with a fresh shift of Newton's method.
@@ -41,6 +41,9 @@ impl ContactSystem {
                 self.fill_path_columns(bodies, around);
             }
             self.dense.problem.mass_ratio = self.mass_ratio(bodies, context);
+            let condensed = Condensed { groups: self.groups.holds, coupled: &self.groups.condensed };
+            self.dense.condensation.update(&self.dense.problem, condensed);
+            self.spent.operations += self.groups.condensation_work();
         }
         self.dense.problem.multiply(&self.lambda, &mut self.dense.slips);
         if matches!(change, Change::Contacts | Change::Forces) {
@@ -67,7 +70,8 @@ impl ContactSystem {
         let active = &self.active;
         let end = |i: usize| end(&active[i].constraint, bodies, context, &reactions);
         let dense = &mut self.dense;
-        dense.solver.predict(&dense.problem, &self.lambda, |i| active[i].shift, end);
+        let shift = |i: usize| active[i].shift;
+        dense.condensation.predict(&dense.problem, &mut dense.solver, &self.lambda, shift, end);
         self.reactions = reactions;
     }
 
@@ -94,8 +98,9 @@ impl ContactSystem {
             let dense = &mut self.dense;
             dense.problem.g.clone_from(&dense.g_free);
             self.active.iter().for_each(|contact| dense.problem.g[contact.first] += contact.shift);
-            let (lambda, product) = (&mut self.lambda, &mut dense.slips);
-            let done = dense.solver.solve(&dense.problem, lambda, product, tolerance, effort);
+            let (problem, solver, forces) =
+                (&dense.problem, &mut dense.solver, [&mut self.lambda, &mut dense.slips]);
+            let done = dense.condensation.solve_by_newton(problem, solver, forces, tolerance, effort);
             self.work.newton_steps += done.newton_steps;
             self.work.factorizations += done.factorizations;
             self.work.failures += done.failures;
@@ -123,7 +128,8 @@ impl ContactSystem {
         let left = around.context.limits.iterations.saturating_sub(self.spent.iterations);
         let budget = ((SHARE * left as f64) as usize).max(SWEEPS);
         let (problem, forces) = (&self.dense.problem, [&mut self.lambda[..], &mut self.gaps[..]]);
-        let done = self.dense.sweeps.solve(problem, forces, around.tolerance, budget);
+        let (condensation, sweeps) = (&mut self.dense.condensation, &mut self.dense.sweeps);
+        let done = condensation.solve_by_sweeps(problem, sweeps, forces, around.tolerance, budget);
         self.work.sweeps += done.sweeps;
         self.spent.iterations += done.sweeps;
         self.work.error = done.error;

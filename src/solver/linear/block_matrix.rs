@@ -131,11 +131,17 @@ impl BlockFactor {
 
     /// Factors the matrix in its place.
     pub fn factorize(&mut self) -> Result<(), NotPositiveDefinite> {
+        self.eliminate(usize::MAX)
+    }
+
+    /// Factors its first groups, as many as `count`, in their place; of the others remains the Schur complement.
+    pub fn eliminate(&mut self, count: usize) -> Result<(), NotPositiveDefinite> {
         let Self { L, columns, scratch, .. } = self;
         let BlockMatrix { pattern, offsets, values } = L;
         columns.clear();
         columns.extend((0..pattern.pairs.len()).filter(|&k| pattern.pairs[k].0 == pattern.pairs[k].1));
         columns.push(pattern.pairs.len());
+        columns.truncate(count.saturating_add(1));
         for window in 0..columns.len() - 1 {
             let (first, end) = (columns[window], columns[window + 1]);
             let n = pattern.range(pattern.pairs[first].1).len();
@@ -151,10 +157,12 @@ impl BlockFactor {
             for b in first + 1..end {
                 for a in b..end {
                     let (i, j) = (pattern.pairs[a].0, pattern.pairs[b].0);
-                    let column = &pattern.pairs[columns[j]..columns[j + 1]];
                     // The pattern holds the fill.
-                    let Ok(found) = column.binary_search(&(i, j)) else { continue };
-                    let target = columns[j] + found;
+                    let order = |&(i, j): &(usize, usize)| (j, i);
+                    let Ok(found) = pattern.pairs[end..].binary_search_by_key(&(j, i), order) else {
+                        continue;
+                    };
+                    let target = end + found;
                     let target = offsets[target] - offsets[end]..offsets[target + 1] - offsets[end];
                     let sizes = [pattern.range(i).len(), pattern.range(j).len(), n];
                     subtract_product(&mut rest[target], &below[place(a)], &below[place(b)], sizes);
@@ -166,6 +174,12 @@ impl BlockFactor {
 
     /// Solves in place.
     pub fn solve(&mut self, x: &mut [f64]) {
+        self.solve_forward(x);
+        self.solve_backward(x);
+    }
+
+    /// `L y = x` for the groups that were eliminated; from the others what those do to them is taken.
+    pub fn solve_forward(&mut self, x: &mut [f64]) {
         let Self { L, columns, work, .. } = self;
         let pattern = &L.pattern;
         for column in columns.windows(2) {
@@ -179,6 +193,12 @@ impl BlockFactor {
                 x[rows].iter_mut().zip(work.iter()).for_each(|(x, w)| *x -= w);
             }
         }
+    }
+
+    /// `Lᵀ x = y` for the groups that were eliminated, given x of the others.
+    pub fn solve_backward(&mut self, x: &mut [f64]) {
+        let Self { L, columns, work, .. } = self;
+        let pattern = &L.pattern;
         for column in columns.windows(2).rev() {
             let own = pattern.range(pattern.pairs[column[0]].1);
             work.clear();
