@@ -42,17 +42,35 @@ fn allocations(
     steps: usize,
     counted: usize,
 ) -> usize {
+    allocations_with(builders, boxes, false, [steps, counted])
+}
+
+/// The same; where it is `glued` the first body's top is attached to the first box.
+fn allocations_with(
+    builders: Vec<DeformableBodyBuilder>,
+    boxes: &[Vector],
+    glued: bool,
+    [steps, counted]: [usize; 2],
+) -> usize {
     let mut physics = PhysicsWorld::new();
     let floor = RigidBodyBuilder::fixed().translation(Vector::Y * -0.5);
     physics.insert(floor, ColliderBuilder::cuboid(20.0, 0.5, 20.0).friction(0.5));
+    let mut rigid = Vec::new();
     for at in boxes {
         let body = RigidBodyBuilder::dynamic().translation(*at).can_sleep(false);
-        physics.insert(body, ColliderBuilder::cuboid(0.1, 0.1, 0.1).friction(0.5));
+        rigid.push(physics.insert(body, ColliderBuilder::cuboid(0.1, 0.1, 0.1).friction(0.5)).0);
     }
     let mut pipeline = DeformablePipeline::new();
     let mut set = DeformableBodySet::new();
     for builder in builders {
         set.insert(builder).unwrap();
+    }
+    if glued {
+        let (handle, body) = set.iter().next().unwrap();
+        let top: Vec<usize> =
+            (0..body.vertex_count()).filter(|&v| body.model().rest_position(v)[1] > 0.19).collect();
+        let to = AttachTo::RigidBody(rigid[0], *physics.bodies[rigid[0]].position());
+        set.attach(handle, &top, to).unwrap();
     }
     let parameters = DeformableParameters::default();
     let mut allocated = 0;
@@ -97,6 +115,11 @@ fn a_resting_cube_allocates_nothing() {
 #[test]
 fn a_box_on_a_cube_allocates_nothing() {
     assert_eq!(allocations(vec![cube(1e6, Vector::Y * 0.2)], &[Vector::Y * 0.5], 180, 40), 0);
+}
+
+#[test]
+fn a_box_glued_on_a_cube_allocates_nothing() {
+    assert_eq!(allocations_with(vec![cube(1e6, Vector::Y * 0.2)], &[Vector::Y * 0.5], true, [180, 40]), 0);
 }
 
 #[test]

@@ -11,7 +11,8 @@ use proptest::prelude::*;
 fn condensed(problem: &ConeProblem, holds: usize) -> Condensation {
     let coupled: Vec<_> = problem.filled.iter().copied().filter(|(_, column)| *column >= holds).collect();
     let mut condensation = Condensation::default();
-    condensation.update(problem, Condensed { groups: holds, coupled: &coupled });
+    assert_eq!(condensation.update(problem, Condensed { groups: holds, coupled: &coupled }), holds > 0);
+    assert!(!condensation.update(problem, Condensed { groups: holds, coupled: &coupled }));
     condensation
 }
 

@@ -29,6 +29,8 @@ pub(crate) struct Condensation {
     problem: ConeProblem,
     /// Rows of what is condensed; none where nothing is.
     held: usize,
+    /// Version and proximal parameter of what it was made of, and the groups condensed.
+    made_of: Option<(u64, f64, usize)>,
     factor: BlockFactor,
     pairs: Vec<(usize, usize)>,
     starts: Vec<usize>,
@@ -42,19 +44,23 @@ pub(crate) struct Condensation {
 }
 
 impl Condensation {
-    /// Takes a problem whose W or rows have changed; where it can't be condensed it is solved whole.
-    pub fn update(&mut self, full: &ConeProblem, condensed: Condensed<'_>) {
-        self.held = 0;
+    /// Takes a problem; tells whether it had to be condensed anew. Where it can't be it is solved whole.
+    pub fn update(&mut self, full: &ConeProblem, condensed: Condensed<'_>) -> bool {
+        let made_of = Some((full.version, full.epsilon(), condensed.groups));
+        if self.made_of == made_of {
+            return false;
+        }
+        (self.held, self.made_of) = (0, made_of);
         if condensed.groups == 0 {
-            return;
+            return false;
         }
         self.fill(full, condensed);
-        if self.factor.eliminate(condensed.groups).is_err() {
-            return;
+        if self.factor.eliminate(condensed.groups).is_ok() {
+            self.held = full.W.pattern().starts[condensed.groups];
+            self.take_contacts(full, condensed);
+            self.take_laws(full);
         }
-        self.held = full.W.pattern().starts[condensed.groups];
-        self.take_contacts(full, condensed);
-        self.take_laws(full);
+        true
     }
 
     /// Puts W with what constraints yield by into the factor's place.

@@ -42,8 +42,9 @@ impl ContactSystem {
             }
             self.dense.problem.mass_ratio = self.mass_ratio(bodies, context);
             let condensed = Condensed { groups: self.groups.holds, coupled: &self.groups.condensed };
-            self.dense.condensation.update(&self.dense.problem, condensed);
-            self.spent.operations += self.groups.condensation_work();
+            if self.dense.condensation.update(&self.dense.problem, condensed) {
+                self.spent.operations += self.groups.condensation_work();
+            }
         }
         self.dense.problem.multiply(&self.lambda, &mut self.dense.slips);
         if matches!(change, Change::Contacts | Change::Forces) {
