@@ -56,20 +56,33 @@ impl PyDeformableBuilder {
     /// The body, with its pins.
     pub fn finish(&self, py: Python<'_>) -> PyResult<DeformableBody> {
         let (model, changes) = (&self.model, &self.changes);
-        let build = || changes.iter().fold(DeformableBodyBuilder::model(model.clone()), |b, c| c(b)).build();
+        let build = || unpinned(model, changes).build();
         let mut body = py.detach(|| without_panic(build))?.map_err(raised)?;
-        if let Some(pinned) = &self.pinned {
-            let pinned = pinned.bind(py);
-            let told = match pinned.is_callable() {
-                true => pinned.call1((rows(py, crate::deformable::positions(&body))?,))?,
-                false => pinned.clone(),
-            };
-            for vertex in vertices(&told, "pinned", body.vertex_count())? {
-                body.pin(vertex).map_err(raised)?;
-            }
+        for vertex in self.pins(py, &body)? {
+            body.pin(vertex).map_err(raised)?;
         }
         Ok(body)
     }
+
+    /// The crate's builder, without pins.
+    pub fn unpinned(&self) -> DeformableBodyBuilder {
+        unpinned(&self.model, &self.changes)
+    }
+
+    /// The vertices of a body that are to be pinned.
+    pub fn pins(&self, py: Python<'_>, body: &DeformableBody) -> PyResult<Vec<usize>> {
+        let Some(pinned) = &self.pinned else { return Ok(Vec::new()) };
+        let pinned = pinned.bind(py);
+        let told = match pinned.is_callable() {
+            true => pinned.call1((rows(py, crate::deformable::positions(body))?,))?,
+            false => pinned.clone(),
+        };
+        vertices(&told, "pinned", body.vertex_count())
+    }
+}
+
+fn unpinned(model: &Arc<DeformableModel>, changes: &[Change]) -> DeformableBodyBuilder {
+    changes.iter().fold(DeformableBodyBuilder::model(model.clone()), |builder, change| change(builder))
 }
 
 /// Notes the places that `ask` asks about: the crate does so one at a time, users are told of all at once.

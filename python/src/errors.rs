@@ -26,9 +26,9 @@ impl<E: Into<DeformableBodyError>> From<E> for Failure {
 impl From<Failure> for PyErr {
     fn from(Failure(error): Failure) -> Self {
         match error {
-            DeformableBodyError::Handle(error @ HandleError::NoSuchBody { .. }) => {
-                exceptions::InvalidHandle::new_err(error.to_string())
-            }
+            DeformableBodyError::Handle(
+                error @ (HandleError::NoSuchBody { .. } | HandleError::NoSuchRigidBody { .. }),
+            ) => exceptions::InvalidHandle::new_err(error.to_string()),
             other => exceptions::DeformableBodyError::new_err(other.to_string()),
         }
     }

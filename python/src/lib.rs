@@ -44,6 +44,7 @@ mod recording;
 mod rigid;
 mod rigid_builder;
 mod rigid_forces;
+mod rigid_regions;
 mod robot;
 mod sets;
 mod signals;
@@ -100,6 +101,8 @@ mod native {
     use crate::rigid::PyRigidBody;
     #[pymodule_export]
     use crate::rigid_builder::PyRigidBodyBuilder;
+    #[pymodule_export]
+    use crate::rigid_regions::PyRigidRegion;
     #[pymodule_export]
     use crate::robot::PyRobot;
     #[pymodule_export]

@@ -1,6 +1,7 @@
 //! Scenes and oracles shared by the tests.
 #![allow(dead_code)]
 
+pub mod bones;
 pub mod cables;
 pub mod cavities;
 pub mod games;
