@@ -181,6 +181,12 @@ pub struct RegionMaterial {
     pub group: Option<String>,
     /// Direction of the warp of its woven sheets, if it is not the body's.
     pub warp: Option<Vec3>,
+    /// Whether it is rigid, a bone or an insert: a body of its own of its material's density, or part of another.
+    #[serde(default)]
+    pub rigid: bool,
+    /// The rigid body that it is part of, which keeps its mass.
+    #[schemars(with = "Option<String>")]
+    pub part_of: Option<Spanned<String>>,
     /// What it is made of.
     pub material: Material,
 }

@@ -88,15 +88,22 @@ impl Before {
 impl Stage {
     /// Asked for before every step of a scene that watches losses.
     pub(crate) fn begin_losses(&mut self) {
-        self.losses.rigid = self.rigid.iter().map(|r| Motion::of(&self.physics.bodies[r.1])).collect();
+        self.losses.rigid = self
+            .rigid
+            .iter()
+            .map(|r| (&r.0, r.1))
+            .chain(self.bones.iter().map(|b| (&b.0, b.1)))
+            .map(|r| Motion::of(&self.physics.bodies[r.1]))
+            .collect();
         self.losses.soft = self.deformable.iter().map(|d| Before::of(&self.world.bodies[d.1])).collect();
     }
 
     /// Asked for after it.
     pub(crate) fn end_losses(&mut self) {
         let h = f64::from(self.physics.integration_parameters.dt);
-        for ((name, body, _), before) in self.rigid.iter().zip(&self.losses.rigid) {
-            let body = &self.physics.bodies[*body];
+        let rigid = self.rigid.iter().map(|r| (&r.0, r.1)).chain(self.bones.iter().map(|b| (&b.0, b.1)));
+        for ((name, body), before) in rigid.zip(&self.losses.rigid) {
+            let body = &self.physics.bodies[body];
             if body.is_dynamic() {
                 *self.losses.of.entry(name.clone()).or_default() += before.loss(body, h);
             }

@@ -179,10 +179,9 @@ impl Stage {
                 .map(|name| self.energy(quantity, name))
                 .sum();
         }
-        let height = {
-            let gravity = self.physics.gravity.to_array().map(f64::from);
-            -self.position(of).iter().zip(gravity).map(|(x, g)| x * g).sum::<f64>()
-        };
+        let gravity = self.physics.gravity.to_array().map(f64::from);
+        let height_of = |at: [f64; 3]| -at.iter().zip(gravity).map(|(x, g)| x * g).sum::<f64>();
+        let height = height_of(self.position(of));
         let [kinetic, elastic, gravity] = match self.thing(of) {
             Some(Thing::Rigid(body, _)) => {
                 let body = &self.physics.bodies[body];
@@ -190,7 +189,12 @@ impl Stage {
             }
             Some(Thing::Soft(body)) => {
                 let body = &self.world.bodies[body];
-                [body.kinetic_energy(), body.elastic_energy(), body.mass() * height]
+                let own = [body.kinetic_energy(), body.elastic_energy(), body.mass() * height];
+                self.bones_of(of).fold(own, |[kinetic, elastic, gravity], bone| {
+                    let height = height_of(bone.center_of_mass().to_array().map(f64::from));
+                    let mass = f64::from(bone.mass());
+                    [kinetic + f64::from(bone.kinetic_energy()), elastic, gravity + mass * height]
+                })
             }
             _ => [f64::NAN; 3],
         };

@@ -1,6 +1,7 @@
 //! A scene file turned into a rapier world and a deformable one, and what can be measured of it.
 
 mod actuation;
+mod bones;
 mod drive;
 mod fall;
 mod joints;
@@ -30,6 +31,8 @@ pub struct Stage {
     pub rigid: Vec<(String, RigidBodyHandle, ColliderHandle)>,
     /// Soft bodies, in the order of the file.
     pub deformable: Vec<(String, DeformableBodyHandle)>,
+    /// Rigid bodies of their own that regions of deformables are, with the name of the deformable.
+    pub bones: Vec<(String, RigidBodyHandle)>,
     /// Watched vertices, in the order of the file.
     pub probes: Vec<(String, DeformableBodyHandle, usize)>,
     /// Joints, in the order of the file.
@@ -67,6 +70,7 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
         world: DeformableWorld::new(),
         rigid: Vec::new(),
         deformable: Vec::new(),
+        bones: Vec::new(),
         probes: Vec::new(),
         joints: Vec::new(),
         attachments: Vec::new(),
@@ -78,14 +82,8 @@ pub fn build(scene: &Scene, folder: &Path) -> Result<Stage, String> {
     scene.rigid.iter().try_for_each(|body| stage.add_rigid(body, folder))?;
     scene.joint.iter().try_for_each(|joint| stage.join(joint))?;
     for body in &scene.deformable {
-        let name = body.name.as_ref().clone();
-        let said = |what: String| format!("deformable \"{name}\": {what}");
-        let builder = soft::deformable(body, folder).map_err(said)?;
-        let handle = stage.world.insert(builder).map_err(|e| said(e.to_string()))?;
-        if body.pinned.is_some() && stage.world.bodies[handle].pinned().len() == 0 {
-            return Err(said("`pinned`: no vertex is in its boxes".into()));
-        }
-        stage.deformable.push((name.clone(), handle));
+        let said = |what: String| format!("deformable \"{}\": {what}", body.name.as_ref());
+        stage.add_deformable(body, folder).map_err(said)?;
     }
     scene.attach.iter().try_for_each(|attach| stage.attach(attach))?;
     scene.cable.iter().try_for_each(|cable| stage.lay(cable))?;

@@ -27,9 +27,9 @@ fn polyline(points: &[[f32; 3]], segments: usize) -> Vec<Vector> {
     (0..=segments).map(|k| at(total * k as f32 / segments.max(1) as f32)).collect()
 }
 
-/// The shape of a deformable.
-fn mesh(body: &scene::Deformable, folder: &Path) -> Result<DeformableBodyBuilder, String> {
-    Ok(match body.body.as_ref() {
+/// The shape of a deformable, and the numbers that its regions have in a file.
+fn mesh(body: &scene::Deformable, folder: &Path) -> Result<(DeformableBodyBuilder, Vec<u32>), String> {
+    let builder = match body.body.as_ref() {
         Body::Lattice { half_extents, cells, hollows } if hollows.is_empty() => {
             DeformableBodyBuilder::cuboid((*half_extents).into(), *cells)
         }
@@ -45,7 +45,8 @@ fn mesh(body: &scene::Deformable, folder: &Path) -> Result<DeformableBodyBuilder
         Body::Mesh { path, cell_size, scale, z_up } => {
             let tets = tetrahedra(&folder.join(path), *cell_size, *scale, *z_up)?;
             let builder = DeformableBodyBuilder::mesh(&tets);
-            return with_groups(builder, &tets, &body.regions);
+            let numbers = group_numbers(&tets, &body.regions)?;
+            return Ok((with_groups(builder, &numbers, &body.regions), numbers));
         }
         Body::Cloth { half_extents, cells, thickness } => {
             DeformableBodyBuilder::cloth(*half_extents, *cells, *thickness)
@@ -57,21 +58,24 @@ fn mesh(body: &scene::Deformable, folder: &Path) -> Result<DeformableBodyBuilder
             let mesh = TetMesh::cuboid(half_extents.map(f64::from), *cells).map_err(|e| e.to_string())?;
             DeformableBodyBuilder::spring_network(&mesh)
         }
-    })
+    };
+    Ok((builder, Vec::new()))
 }
 
 type Regions = [toml::Spanned<scene::RegionMaterial>];
 
+/// Numbers of the physical groups of a file; none where regions are boxes.
+fn group_numbers(mesh: &TetMesh, regions: &Regions) -> Result<Vec<u32>, String> {
+    let groups = regions.iter().filter_map(|region| region.as_ref().group.as_ref());
+    let number =
+        |group: &String| mesh.region_named(group).ok_or_else(|| format!("its mesh has no group \"{group}\""));
+    groups.map(number).collect()
+}
+
 /// Materials of the physical groups of a file.
-fn with_groups(
-    builder: DeformableBodyBuilder,
-    mesh: &TetMesh,
-    regions: &Regions,
-) -> Result<DeformableBodyBuilder, String> {
-    regions.iter().map(toml::Spanned::as_ref).try_fold(builder, |builder, region| {
-        let Some(group) = &region.group else { return Ok(builder) };
-        let number = mesh.region_named(group).ok_or_else(|| format!("its mesh has no group \"{group}\""))?;
-        Ok(builder.region_material(number, region.material.to_material()))
+fn with_groups(builder: DeformableBodyBuilder, numbers: &[u32], regions: &Regions) -> DeformableBodyBuilder {
+    numbers.iter().zip(regions).fold(builder, |builder, (number, region)| {
+        builder.region_material(*number, region.as_ref().material.to_material())
     })
 }
 
@@ -182,9 +186,14 @@ fn solved_by(builder: DeformableBodyBuilder, asked: &scene::Solver) -> Deformabl
     })
 }
 
-/// A body as its file describes it.
-pub(super) fn deformable(body: &scene::Deformable, folder: &Path) -> Result<DeformableBodyBuilder, String> {
-    let builder = solved_by(with_boxes(mesh(body, folder)?, body), &body.solver);
+/// A body as its file describes it, and the numbers of its regions.
+pub(super) fn deformable(
+    body: &scene::Deformable,
+    folder: &Path,
+) -> Result<(DeformableBodyBuilder, Vec<u32>), String> {
+    let (shape, groups) = mesh(body, folder)?;
+    let numbers = if groups.is_empty() { (1..=body.regions.len() as u32).collect() } else { groups };
+    let builder = solved_by(with_boxes(shape, body), &body.solver);
     let builder = builder
         .pose(pose(body.translation, body.rotation))
         .linvel(body.linvel.into())
@@ -193,11 +202,12 @@ pub(super) fn deformable(body: &scene::Deformable, folder: &Path) -> Result<Defo
         // What a scene expects of rest is to be found awake.
         .can_sleep(false);
     let builder = filled(builder.self_contact(body.self_contact), body)?;
-    Ok(match body.pinned.clone() {
+    let builder = match body.pinned.clone() {
         Some(regions) => builder.pinned(move |x| {
             let within = |r: &scene::Region| x.cmpge(r.min.into()).all() && x.cmple(r.max.into()).all();
             regions.all().iter().any(within)
         }),
         None => builder,
-    })
+    };
+    Ok((builder, numbers))
 }

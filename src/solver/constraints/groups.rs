@@ -38,8 +38,9 @@ pub(crate) struct ContactGroups {
 
 impl ContactGroups {
     /// Puts the contacts into groups, and the groups into an order of least degree.
-    pub fn arrange(&mut self, contacts: &mut [ActiveContact], proxies: &RigidProxies) {
-        self.find(contacts, proxies);
+    /// Where it `condenses`, what holds deformable bodies comes first.
+    pub fn arrange(&mut self, contacts: &mut [ActiveContact], proxies: &RigidProxies, condenses: bool) {
+        self.find(contacts, proxies, condenses);
         self.find_adjacent();
         self.are_holds.clear();
         self.are_holds.extend(self.ends.iter().map(|ends| ends.are_holds));
@@ -50,7 +51,8 @@ impl ContactGroups {
         if !sorted {
             let known = &self.known;
             let rank_of = |constraint: &Constraint| {
-                let found = known.binary_search_by_key(&ends_of(constraint, proxies), |(ends, _)| *ends);
+                let ends = ends_of(constraint, proxies, condenses);
+                let found = known.binary_search_by_key(&ends, |(ends, _)| *ends);
                 found.map_or(usize::MAX, |at| rank[known[at].1])
             };
             let order = |a: &Constraint, b: &Constraint| rank_of(a).cmp(&rank_of(b)).then(a.key.cmp(&b.key));
@@ -65,13 +67,13 @@ impl ContactGroups {
         self.fill();
     }
 
-    fn find(&mut self, contacts: &[ActiveContact], proxies: &RigidProxies) {
+    fn find(&mut self, contacts: &[ActiveContact], proxies: &RigidProxies, condenses: bool) {
         self.ends.clear();
         self.known.clear();
         self.sizes.clear();
         self.group_of_constraint.clear();
         for contact in contacts {
-            let ends = ends_of(&contact.constraint, proxies);
+            let ends = ends_of(&contact.constraint, proxies, condenses);
             let last = self.group_of_constraint.last().copied().filter(|&g: &usize| self.ends[g] == ends);
             let group = last.unwrap_or_else(|| match self.known.binary_search_by_key(&ends, |(e, _)| *e) {
                 Ok(at) => self.known[at].1,
@@ -168,7 +170,7 @@ impl ContactGroups {
 const OF_PATHS: Ends = Ends { are_holds: false, things: [Some(u64::MAX); 2] };
 
 /// The two things that a constraint is between, as far as they yield.
-fn ends_of(constraint: &Constraint, proxies: &RigidProxies) -> Ends {
+fn ends_of(constraint: &Constraint, proxies: &RigidProxies, condenses: bool) -> Ends {
     if !constraint.path.is_empty() {
         return OF_PATHS;
     }
@@ -179,5 +181,6 @@ fn ends_of(constraint: &Constraint, proxies: &RigidProxies) -> Ends {
             proxies.yields(*proxy).then(|| 1 << 32 | u64::from(group.0))
         }
     };
-    Ends { are_holds: constraint.holds_deformable(), things: constraint.endpoints.each_ref().map(thing) }
+    let are_holds = condenses && constraint.holds_deformable();
+    Ends { are_holds, things: constraint.endpoints.each_ref().map(thing) }
 }

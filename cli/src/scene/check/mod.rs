@@ -269,7 +269,7 @@ fn check_bodies(scene: &Scene) -> Result<(), Mistake> {
         problem.map_or(Ok(()), |what| Err((body.body.span(), format!("`body`: {what}"))))?;
         let material = body.material.as_ref().to_material().validate();
         material.map_err(|what| (body.material.span(), format!("`material`: {what}")))?;
-        check_regions(body)?;
+        check_regions(scene, body)?;
         // Of any room: what is wrong with one of a cubic metre is so with all.
         let wrong = body.cavities.iter().find_map(|c| Some((c.span(), c.as_ref().at_rest(1.0).fault()?)));
         wrong.map_or(Ok(()), |(at, what)| Err((at, format!("`cavities`: {what}"))))?;
@@ -278,7 +278,7 @@ fn check_bodies(scene: &Scene) -> Result<(), Mistake> {
 }
 
 /// Either boxes or groups, with materials that can be.
-fn check_regions(body: &Deformable) -> Result<(), Mistake> {
+fn check_regions(scene: &Scene, body: &Deformable) -> Result<(), Mistake> {
     for region in &body.regions {
         let own = region.as_ref();
         let first = body.regions[0].as_ref();
@@ -288,6 +288,18 @@ fn check_regions(body: &Deformable) -> Result<(), Mistake> {
         }
         if own.group.is_some() && !matches!(body.body.as_ref(), Body::Mesh { .. }) {
             return Err((region.span(), "`group`: only a mesh of a file has groups".into()));
+        }
+        if let Some(name) = &own.part_of {
+            let rigid = rigid_names(scene);
+            if !rigid.contains(&name.as_ref().as_str()) {
+                return Err(unknown(name, "part_of", "a rigid body", &rigid));
+            }
+            if !own.rigid {
+                return Err((
+                    name.span(),
+                    "`part_of`: only a region that is `rigid` is part of a body".into(),
+                ));
+            }
         }
         own.material
             .to_material()
