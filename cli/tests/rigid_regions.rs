@@ -67,7 +67,7 @@ fn a_bone_is_dropped_with_its_bar() {
 #[test]
 fn a_region_that_is_part_of_a_link_is_held_by_it() {
     let measure = r#"measure = [{ name = "y", quantity = "y", of = "bar", take = "min" }]"#;
-    let held = outcome(&bar(r#"rigid = true, part_of = "link""#.replace(", ", "\n").as_str(), measure));
+    let held = outcome(&bar("rigid = true\npart_of = \"link\"", measure));
     assert!(number(&held, "y") > 0.098, "{}", number(&held, "y"));
 }
 

@@ -69,6 +69,11 @@ impl PyDeformableBuilder {
         unpinned(&self.model, &self.changes)
     }
 
+    /// Whether any vertex is to be pinned.
+    pub fn has_pins(&self) -> bool {
+        self.pinned.is_some()
+    }
+
     /// The vertices of a body that are to be pinned.
     pub fn pins(&self, py: Python<'_>, body: &DeformableBody) -> PyResult<Vec<usize>> {
         let Some(pinned) = &self.pinned else { return Ok(Vec::new()) };

@@ -65,20 +65,19 @@ impl World {
             .collect();
         let numbers: Vec<u32> = kinds.iter().map(|(region, _)| *region).collect();
         // Pins are asked for before anything is inserted: they may be refused.
-        let rest = || builder.unpinned().without_regions(&numbers).and_then(|(rest, _)| rest.build());
-        let mut rest = py.detach(|| without_panic(rest))?.map_err(raised)?;
-        let pins = builder.pins(py, &rest)?;
-        pins.iter().try_for_each(|vertex| rest.pin(*vertex)).map_err(raised)?;
+        let mut pins = Vec::new();
+        if builder.has_pins() {
+            let rest = || builder.unpinned().without_regions(&numbers).and_then(|(rest, _)| rest.build());
+            let mut rest = py.detach(|| without_panic(rest))?.map_err(raised)?;
+            pins = builder.pins(py, &rest)?;
+            pins.iter().try_for_each(|vertex| rest.pin(*vertex)).map_err(raised)?;
+        }
         let inserted = self.with(py, |inner| {
             let (deformables, physics) = (&mut inner.deformables, &mut inner.physics);
             let (handle, rigid) =
                 deformables.insert_with_rigid_regions(builder.unpinned(), &kinds, physics)?;
             for vertex in pins {
                 deformables.bodies[handle].pin(vertex)?;
-            }
-            // So that masses can be read before the first step.
-            for region in &rigid {
-                physics.bodies[region.body].recompute_mass_properties_from_colliders(&physics.colliders);
             }
             Ok((handle, rigid))
         })?;

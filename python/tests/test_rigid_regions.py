@@ -76,3 +76,17 @@ def test_what_cannot_be_rigid_says_why_and_leaves_nothing():
     with pytest.raises((ValueError, IndexError)):
         world.add_deformable_with_rigid_regions(bar(pinned=[100_000]), {BONE: 1e3})
     assert (len(world.rigid_bodies), len(world.deformable_bodies)) == (0, 0)
+
+
+def test_a_bone_is_saved_midway_and_goes_on_with_the_same_bits():
+    world = f.World()
+    world.add_collider(f.Collider.cuboid(5, 0.5, 5, translation=(0, -0.5, 0)))
+    thrown = bar(translation=(0, 0.2, 0), angvel=(1, 2, 3), can_sleep=False)
+    body, regions = world.add_deformable_with_rigid_regions(thrown, {BONE: 7_800.0})
+    world.step(20)
+    again = f.World.restore(world.snapshot())
+    for one in (world, again):
+        one.step(60)
+    assert (world.deformable_bodies[body].positions == again.deformable_bodies[body].positions).all()
+    bone = regions[BONE].body
+    assert (world.rigid_bodies[bone].translation == again.rigid_bodies[bone].translation).all()

@@ -89,7 +89,10 @@ impl DeformableWorld {
                 RigidRegionBody::New(density) => {
                     let handle = physics.insert_body(rigid_body(region, density, pose, own));
                     let collider = collider(region, own);
-                    (handle, collider.map(|collider| physics.insert_collider(collider, Some(handle))))
+                    let collider = collider.map(|collider| physics.insert_collider(collider, Some(handle)));
+                    // So that its mass can be read before the first step.
+                    physics.bodies[handle].recompute_mass_properties_from_colliders(&physics.colliders);
+                    (handle, collider)
                 }
                 RigidRegionBody::PartOf(handle) => (handle, None),
             };

@@ -24,10 +24,8 @@ impl Stage {
             let (handle, regions) = inserted.map_err(|e| e.to_string())?;
             for (region, (_, kind)) in regions.iter().zip(&rigid) {
                 if matches!(kind, RigidRegionBody::New(_)) {
-                    let bone = &mut self.physics.bodies[region.body];
-                    bone.activation_mut().normalized_linear_threshold = -1.0;
-                    // So that its mass is known before the first step.
-                    bone.recompute_mass_properties_from_colliders(&self.physics.colliders);
+                    // As deformables of scenes are.
+                    *self.physics.bodies[region.body].activation_mut() = RigidBodyActivation::cannot_sleep();
                     self.bones.push((name.clone(), region.body));
                 }
             }
@@ -48,5 +46,11 @@ impl Stage {
     /// Rigid bodies of their own that regions of a deformable are.
     pub(super) fn bones_of(&self, name: &str) -> impl Iterator<Item = &RigidBody> {
         self.bones.iter().filter(move |bone| bone.0 == name).map(|bone| &self.physics.bodies[bone.1])
+    }
+
+    /// All rigid bodies, bones with the name of their deformable.
+    pub(super) fn all_rigid(&self) -> impl Iterator<Item = (&str, RigidBodyHandle)> {
+        let own = self.rigid.iter().map(|(name, body, _)| (name.as_str(), *body));
+        own.chain(self.bones.iter().map(|(name, body)| (name.as_str(), *body)))
     }
 }

@@ -8,9 +8,7 @@ impl Stage {
     /// Turns, places and speeds up the members of a drop; names were checked with the file.
     pub(super) fn fall(&mut self, scene: &Scene, drop: &Drop) -> Result<(), String> {
         let is_member = |name: &str| drop.members.iter().any(|m| m.as_ref() == name);
-        let rigid =
-            self.rigid.iter().map(|r| (&r.0, r.1)).chain(self.bones.iter().map(|bone| (&bone.0, bone.1)));
-        let rigid: Vec<RigidBodyHandle> = rigid.filter(|r| is_member(r.0)).map(|r| r.1).collect();
+        let rigid: Vec<RigidBodyHandle> = self.all_rigid().filter(|r| is_member(r.0)).map(|r| r.1).collect();
         let soft: Vec<_> = self.deformable.iter().filter(|d| is_member(&d.0)).map(|d| d.1).collect();
         let down = Vector::from(*drop.orientation.as_ref()).normalize();
         let turn = Pose::from_parts(Vector::ZERO, Rotation::from_rotation_arc(down, Vector::NEG_Y));

@@ -88,26 +88,22 @@ impl Before {
 impl Stage {
     /// Asked for before every step of a scene that watches losses.
     pub(crate) fn begin_losses(&mut self) {
-        self.losses.rigid = self
-            .rigid
-            .iter()
-            .map(|r| (&r.0, r.1))
-            .chain(self.bones.iter().map(|b| (&b.0, b.1)))
-            .map(|r| Motion::of(&self.physics.bodies[r.1]))
-            .collect();
+        self.losses.rigid =
+            self.all_rigid().map(|(_, body)| Motion::of(&self.physics.bodies[body])).collect();
         self.losses.soft = self.deformable.iter().map(|d| Before::of(&self.world.bodies[d.1])).collect();
     }
 
     /// Asked for after it.
     pub(crate) fn end_losses(&mut self) {
         let h = f64::from(self.physics.integration_parameters.dt);
-        let rigid = self.rigid.iter().map(|r| (&r.0, r.1)).chain(self.bones.iter().map(|b| (&b.0, b.1)));
-        for ((name, body), before) in rigid.zip(&self.losses.rigid) {
+        let mut losses = std::mem::take(&mut self.losses);
+        for ((name, body), before) in self.all_rigid().zip(&losses.rigid) {
             let body = &self.physics.bodies[body];
             if body.is_dynamic() {
-                *self.losses.of.entry(name.clone()).or_default() += before.loss(body, h);
+                *losses.of.entry(name.to_string()).or_default() += before.loss(body, h);
             }
         }
+        self.losses = losses;
         for ((name, body), before) in self.deformable.iter().zip(&self.losses.soft) {
             let body = &self.world.bodies[*body];
             // The formulas of the second order lose otherwise, and less.

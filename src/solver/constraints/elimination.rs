@@ -9,13 +9,20 @@ pub(super) struct Elimination {
     pub rank: Vec<usize>,
     pub order: Vec<usize>,
     /// What the order was made for.
-    known: (Vec<usize>, Vec<bool>),
-    known_first: Vec<bool>,
+    known: Known,
     graph: Vec<bool>,
     eliminated: Vec<bool>,
     /// Rows of each block and of those adjacent to it, as far as they are not eliminated.
     degrees: Vec<usize>,
     near: Vec<usize>,
+}
+
+/// What an order was made for.
+#[derive(Default)]
+struct Known {
+    sizes: Vec<usize>,
+    graph: Vec<bool>,
+    first: Vec<bool>,
 }
 
 impl Elimination {
@@ -35,14 +42,15 @@ impl Elimination {
     /// The blocks that come `first` before the others; of either the least degree first, counted in rows of these
     /// `sizes`; ties by index.
     pub fn arrange(&mut self, sizes: &[usize], first: &[bool]) {
-        if self.known.0 == sizes && self.known.1 == self.graph && self.known_first == first {
+        let known = &mut self.known;
+        if known.sizes == sizes && known.graph == self.graph && known.first == first {
             return;
         }
-        self.known_first.clear();
-        self.known_first.extend_from_slice(first);
-        self.known.0.clear();
-        self.known.0.extend_from_slice(sizes);
-        self.known.1.clone_from(&self.graph);
+        known.first.clear();
+        known.first.extend_from_slice(first);
+        known.sizes.clear();
+        known.sizes.extend_from_slice(sizes);
+        known.graph.clone_from(&self.graph);
         self.adjacent.clone_from(&self.graph);
         let Self { adjacent, eliminated, degrees, near, rank, order, .. } = self;
         let blocks = sizes.len();
