@@ -58,6 +58,7 @@ pub fn methods(scene: &Scene) -> Vec<Method> {
     for (family, solver, counts) in [
         ("Laplacian", Solver::Projective, &[1, 3, 10, 30, 100][..]),
         ("Gauss–Seidel", Solver::GaussSeidel, &[3, 10, 30, 100]),
+        ("XPBD", Solver::Xpbd, &[1, 10, 100]),
         ("Jacobi", Solver::Jacobi, &[10, 30, 100]),
     ] {
         for &n in counts {

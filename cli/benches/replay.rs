@@ -24,7 +24,7 @@ fn main() {
     let scene = parse(SCENE).expect("a scene");
     let file =
         SceneFile { scene, folder: ".".into(), name: "slab".into(), text: SCENE.into(), paths: vec![] };
-    let run = run(&file, &RunOptions { replay_rate: 60.0, progress: None });
+    let run = run(&file, &RunOptions { replay_rate: 60.0, ..RunOptions::default() });
     let replay = run.replay.as_ref().expect("a replay").to_bytes();
     let (outcome, costs, trace) = (&run.outcome, &run.trace.costs(), &run.trace);
     let page = page_of_run(&PageOfRun { outcome, costs, trace, drifts: &[], replay: Some(&replay) });

@@ -119,6 +119,47 @@ fn pictures_and_films_are_written() {
     assert_eq!(frames, 6);
 }
 
+#[test]
+fn stress_is_seen_and_files_for_other_programs_are_written() {
+    let folder = folder("files");
+    let scene = format!("{SCENES}/heavy_on_soft.toml");
+    let short = ["--set", "world.duration=0.3", "--size", "64x48"];
+    let said = |more: &[&str]| foible_exits(&folder, &[&["replay", &scene][..], more, &short].concat(), 0);
+    said(&["--png", "plain.png"]);
+    said(&["--png", "stress.png", "--stress", "1e3", "--glb", "run.glb", "--vtu", "run.pvd", "--rate", "20"]);
+    let pixels = |name: &str| {
+        let png = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(folder.join(name)).unwrap()));
+        let mut png = png.read_info().unwrap();
+        let mut pixels = vec![0; png.output_buffer_size().unwrap()];
+        png.next_frame(&mut pixels).unwrap();
+        pixels
+    };
+    let differ =
+        pixels("plain.png").chunks(3).zip(pixels("stress.png").chunks(3)).filter(|(a, b)| a != b).count();
+    assert!(differ > 50, "{differ}");
+    // Without a time it is the end, where a heavy box has pressed: not where the run began.
+    said(&["--png", "end.png", "--at", "0.3", "--stress", "1e3"]);
+    said(&["--png", "start.png", "--at", "0", "--stress", "1e3"]);
+    assert!(pixels("end.png") == pixels("stress.png") && pixels("start.png") != pixels("stress.png"));
+    // What bears more than the scale is red.
+    let red = pixels("stress.png").chunks(3).filter(|p| p[0] > 2 * p[2].max(1) && p[0] > 80).count();
+    assert!(red > 20, "{red}");
+    // Frames at 0, 0.05, … 0.3 s.
+    let list = std::fs::read_to_string(folder.join("run.pvd")).unwrap();
+    assert_eq!(list.matches("<DataSet").count(), 7);
+    assert!((0..7).all(|k| folder.join(format!("run_{k:05}.vtu")).exists()));
+    let glb = std::fs::read(folder.join("run.glb")).unwrap();
+    assert_eq!(&glb[..4], b"glTF");
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let json: serde_json::Value = serde_json::from_slice(&glb[20..20 + length]).unwrap();
+    let times = &json["animations"][0]["samplers"][0]["input"];
+    assert_eq!(json["accessors"][times.as_u64().unwrap() as usize]["count"], 7);
+    let wrong = foible_exits(&folder, &["replay", &scene, "--png", "a.png", "--stress=-1"], 2);
+    assert!(wrong.contains("--stress -1 must be positive"), "{wrong}");
+    let nowhere = foible_exits(&folder, &["replay", &scene, "--glb", "none/such/run.glb"], 2);
+    assert!(nowhere.contains("run.glb"), "{nowhere}");
+}
+
 /// Scenes without soft bodies, with names that are no file names, twice the same, and results that cannot be written.
 #[test]
 fn odd_scenes_and_places() {

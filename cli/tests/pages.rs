@@ -17,7 +17,7 @@ fn five_seconds() -> Run {
             rotation = [40, 20, 10], angvel = [1, 2, 0], material = { youngs_modulus = 2e4, poisson_ratio = 0.3, density = 200 } }]
         "#,
     );
-    run(&file, &RunOptions { replay_rate: 60.0, progress: None })
+    run(&file, &RunOptions { replay_rate: 60.0, ..RunOptions::default() })
 }
 
 /// The bytes of a replay read by its description alone: header, then arrays in order.

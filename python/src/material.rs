@@ -69,6 +69,54 @@ impl PyMaterial {
         Self(DeformableMaterial::sylgard_184())
     }
 
+    /// The silicone Ecoflex 00-30, neo-Hookean, as rubbers below: 29.7 kPa at twice its length.
+    #[staticmethod]
+    fn ecoflex_00_30() -> Self {
+        Self(DeformableMaterial::ecoflex_00_30())
+    }
+
+    /// The silicone Ecoflex 00-50: 41 kPa at twice its length.
+    #[staticmethod]
+    fn ecoflex_00_50() -> Self {
+        Self(DeformableMaterial::ecoflex_00_50())
+    }
+
+    /// The silicone Dragon Skin 10 Medium: 113 kPa at twice its length.
+    #[staticmethod]
+    fn dragon_skin_10() -> Self {
+        Self(DeformableMaterial::dragon_skin_10())
+    }
+
+    /// The silicone Dragon Skin 20: 318 kPa at twice its length.
+    #[staticmethod]
+    fn dragon_skin_20() -> Self {
+        Self(DeformableMaterial::dragon_skin_20())
+    }
+
+    /// The silicone Dragon Skin 30: 437 kPa at twice its length.
+    #[staticmethod]
+    fn dragon_skin_30() -> Self {
+        Self(DeformableMaterial::dragon_skin_30())
+    }
+
+    /// Natural rubber without filler: 0.53 MPa at twice its length.
+    #[staticmethod]
+    fn natural_rubber() -> Self {
+        Self(DeformableMaterial::natural_rubber())
+    }
+
+    /// The thermoplastic polyurethane Texin 245, 43 Shore D.
+    #[staticmethod]
+    fn texin_245() -> Self {
+        Self(DeformableMaterial::texin_245())
+    }
+
+    /// Healthy human liver in the body, for small strains.
+    #[staticmethod]
+    fn liver() -> Self {
+        Self(DeformableMaterial::liver())
+    }
+
     /// The closed-cell polyethylene foam Plastazote LD33.
     #[staticmethod]
     fn plastazote_ld33() -> Self {

@@ -27,8 +27,9 @@ impl World {
     /// A picture of the world as it is: an array of shape (height, width, 3) of bytes, red, green and blue, drawn without a window.
     ///
     /// ``size`` is (width, height) in pixels. The camera looks at a ball of ``center`` and ``radius`` [m], all that moves if they are not told,
-    /// from the side ``yaw`` and from above by ``pitch`` [degrees]; upward is against gravity. Sensors, joints and cables are not drawn.
-    #[pyo3(signature = (size = (640, 480), *, center = None, radius = None, yaw = 35.0, pitch = 20.0))]
+    /// from the side ``yaw`` and from above by ``pitch`` [degrees]; upward is against gravity. With ``stress`` [Pa]
+    /// bodies are coloured by von Mises stress, blue at none and red from that on. Sensors, joints and cables are not drawn.
+    #[pyo3(signature = (size = (640, 480), *, center = None, radius = None, yaw = 35.0, pitch = 20.0, stress = None))]
     fn render<'py>(
         &self,
         py: Python<'py>,
@@ -37,9 +38,12 @@ impl World {
         radius: Option<f64>,
         yaw: f64,
         pitch: f64,
+        stress: Option<f64>,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
         let size = [picture_side("width", size.0)?, picture_side("height", size.1)?];
-        let look = Look { size, yaw: number("yaw", yaw, false)?, pitch: number("pitch", pitch, false)? };
+        let stress = stress.map(|most| extent("stress", most)).transpose()?;
+        let (yaw, pitch) = (number("yaw", yaw, false)?, number("pitch", pitch, false)?);
+        let look = Look { size, yaw, pitch, stress };
         let ball = match (center, radius) {
             (Some(center), Some(radius)) => Some((center.finite("center")?, extent("radius", radius)?)),
             (None, None) => None,

@@ -65,6 +65,24 @@ def test_a_picture_shows_a_ball_where_it_is():
     assert both[:80].any() and both[:, 180:].any() and not both[120:].any() and not both[:, :120].any()
 
 
+def test_stress_is_coloured():
+    world = f.World(gravity=(0, 0, 0))
+    cube = world.add_deformable(f.DeformableBody.cuboid((0.1, 0.1, 0.1), (2, 2, 2)).material(f.Material.ecoflex_00_30()))
+    at_rest = world.render((64, 48), stress=1e3)
+    assert (at_rest != world.render((64, 48))).any()
+    positions = world.read_positions()
+    positions[:, 0] *= 1.2
+    world.set_positions(positions)
+    assert cube in world.deformable_bodies
+    stretched = world.render((64, 48), stress=1e3, center=(0, 0, 0), radius=0.3)
+    # A fifth longer it bears some 9 kPa: red where it was blue.
+    middle_before = world.render((64, 48), stress=1e6, center=(0, 0, 0), radius=0.3)[24, 32]
+    middle = stretched[24, 32]
+    assert middle[0] > middle[2] and middle_before[0] < middle_before[2]
+    with pytest.raises(f.DeformableBodyError, match="stress is 0, but must be positive"):
+        world.render(stress=0.0)
+
+
 def test_pictures_that_cannot_be_are_refused():
     world = f.World()
     # Nothing but the background.

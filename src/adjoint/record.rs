@@ -1,6 +1,6 @@
 //! What is kept of a step so that it can be gone through backward, and which steps cannot be.
 
-use crate::body::{ConstraintKey, DeformableBody, Integrator};
+use crate::body::{ConstraintKey, DeformableBody, Integrator, Solver};
 use crate::contact::{Endpoint, Law};
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
@@ -99,6 +99,7 @@ fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
         (body.is_sleeping(), "the body sleeps: it has to be without `can_sleep`"),
         (body.body_type() != RigidBodyType::Dynamic, "the body is not dynamic"),
         (body.settings().integrator != Integrator::ImplicitEuler, "only implicit Euler has one"),
+        (body.settings().solver == Solver::Xpbd, "position-based dynamics does not end at a minimum"),
         (body.materials.iter().any(resists), "stiffness damping and Maxwell branches have none"),
         (body.materials.iter().any(|m| m.orthotropic.is_some()), "woven sheets have none"),
         (body.fillings.iter().any(Option::is_some), "filled cavities have none"),

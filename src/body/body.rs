@@ -3,7 +3,7 @@
 use super::constraint_memory::ConstraintMemory;
 use super::factor_base::FactorBase;
 use super::kinematics::Drive;
-use super::settings::SolverSettings;
+use super::settings::{Solver, SolverSettings};
 use super::sleep::{STILL_SPEED, TIME_UNTIL_SLEEP};
 use super::state::{DeformableState, History, Sleep};
 use super::wind::DeformableWind;
@@ -258,6 +258,12 @@ impl DeformableBody {
     }
 
     // ── For the other rooms of the crate ────────────────────────────────
+
+    /// The step \[s\] whose matrix serves one of `dt`: its own where there is nothing to factor.
+    pub(crate) fn matrix_step(&self, dt: f64) -> f64 {
+        let is_xpbd = self.settings().solver == Solver::Xpbd;
+        if is_xpbd { dt } else { self.state.factor_base.step_near(dt) }
+    }
 
     pub(crate) fn elements(&self) -> Elements<'_> {
         Elements { model: &self.model, materials: &self.materials, activations: &self.activations }

@@ -49,6 +49,8 @@ pub(crate) struct History {
     /// Steps in contact to come that are of implicit Euler, and how often in a row it had to step in.
     pub wait: u8,
     pub failures: u8,
+    /// Elastic energy \[J\] that the multipliers of position-based dynamics held at the end of the last step.
+    pub held: Option<f64>,
 }
 
 /// Most failures in a row that double the steps until the next try.
@@ -72,6 +74,7 @@ impl History {
         self.v.clear();
         self.acceleration.clear();
         self.steady.clear();
+        self.held = None;
     }
 }
 
@@ -141,7 +144,8 @@ impl DeformableState {
             |list: &&Vec<Vec3>| list.is_empty() || list.len() == nodes && list.iter().all(is_number);
         if !(lists.iter().all(is_list)
             && self.history.x.len() == self.history.v.len()
-            && self.history.h.is_finite())
+            && self.history.h.is_finite()
+            && self.history.held.is_none_or(f64::is_finite))
         {
             return Err("the step before its last is not one of its mesh");
         }

@@ -6,6 +6,7 @@ use super::elements::ElementBlock;
 use super::gradients::{deformation_gradient, scatter_forces};
 use super::model::Elements;
 use super::smoothing::SmoothingDomains;
+use super::solid_elements::SolidElement;
 use super::thin_elements::{length_energy, membrane};
 use crate::energy::{ElementEnergy, Lame, with_energy};
 use crate::material::DeformableMaterial;
@@ -46,8 +47,9 @@ pub(crate) fn add_blocks(
     stiffening: impl Fn(&DeformableMaterial) -> f64,
     mut add: impl FnMut(usize, usize, &Mat3),
 ) {
-    elements.model.for_each_energy(elements.materials, |law, nodes, gradients, volume| {
+    elements.model.for_each_energy(elements.materials, |law, element| {
         let Lame { mu, lambda } = law.lame;
+        let SolidElement { nodes, gradients, volume, .. } = *element;
         let (weight, stiffening) = (weight_of(law.material, law.lame), stiffening(law.material));
         for (&i, a) in nodes.iter().zip(gradients) {
             for (&j, b) in nodes.iter().zip(gradients) {

@@ -25,12 +25,14 @@ mod thin_elements;
 
 mod frames;
 
+mod compliant;
 mod hard_limits;
 
 pub(crate) mod constant_matrix;
 mod tangents;
 
 pub use cavities::DeformableCavity;
+pub(crate) use compliant::ElementMultipliers;
 pub use constant_matrix::SystemMatrix;
 pub(crate) use frames::{floating_frame, node_rotations, volume};
 pub(crate) use hard_limits::{HardLimiting, Holds, Room, is_beyond_hard_limits};

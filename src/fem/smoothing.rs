@@ -6,6 +6,7 @@
 //! A domain is an element like any other, of all nodes of its tetrahedra, with the means of their shape
 //! gradients: `F = Σ x_a g_aᵀ`, `f_a = −V P(F) g_a`.
 
+use super::solid_elements::SolidElement;
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lane, LaneMat3};
 use std::collections::BTreeMap;
@@ -119,8 +120,8 @@ impl SmoothingDomains {
         &self.corners[self.starts[block] as usize..self.starts[block + 1] as usize]
     }
 
-    /// Calls `with` with the nodes of every domain of these blocks, the gradients of their shape functions, and its volume.
-    pub fn for_each(&self, blocks: Range<usize>, mut with: impl FnMut(&[u32], &[Vec3], f64)) {
+    /// Calls `with` with every domain of these blocks.
+    pub fn for_each(&self, blocks: Range<usize>, mut with: impl FnMut(&SolidElement<'_>)) {
         let (mut nodes, mut gradients) = (Vec::new(), Vec::new());
         for (block, lane) in blocks.flat_map(|block| (0..LANES).map(move |lane| (block, lane))) {
             if self.volumes[block].0[lane] == 0.0 {
@@ -135,7 +136,8 @@ impl SmoothingDomains {
                     gradients.push(gradient);
                 }
             }
-            with(&nodes, &gradients, self.volumes[block].0[lane]);
+            let volume = self.volumes[block].0[lane];
+            with(&SolidElement { nodes: &nodes, gradients: &gradients, volume, place: [block, lane] });
         }
     }
 

@@ -15,6 +15,22 @@ use crate::mesh::node_adjacency;
 pub(crate) struct Law<'a> {
     pub material: &'a DeformableMaterial,
     pub lame: Lame,
+    /// Of its region.
+    pub region: usize,
+    /// It is one of patches.
+    pub is_patch: bool,
+}
+
+/// An element with an energy.
+#[derive(Clone, Copy)]
+pub(crate) struct SolidElement<'a> {
+    pub nodes: &'a [u32],
+    /// Of the nodes' shape functions [1/m].
+    pub gradients: &'a [Vec3],
+    /// \[m³\]
+    pub volume: f64,
+    /// Its block of four, among those of tetrahedra, of domains around edges, or of patches, and its place in that.
+    pub place: [usize; 2],
 }
 
 impl DeformableModel {
@@ -41,9 +57,9 @@ impl DeformableModel {
         }
         self.regions = regions;
         let mut domains: Vec<Vec<u32>> = Vec::new();
-        self.domains.for_each(0..self.domains.block_count(), |nodes, _, _| domains.push(nodes.to_vec()));
-        self.volume_domains
-            .for_each(0..self.volume_domains.block_count(), |nodes, _, _| domains.push(nodes.to_vec()));
+        for smoothed in [&self.domains, &self.volume_domains] {
+            smoothed.for_each(0..smoothed.block_count(), |element| domains.push(element.nodes.to_vec()));
+        }
         let stencils = self.stencils.iter().map(|s| &s.nodes[..]);
         let thin = self.triangles.iter().map(|t| &t.nodes[..]).chain(stencils);
         let solid = self.tetrahedra.iter().map(|t| &t[..]).chain(domains.iter().map(|p| &p[..]));
@@ -73,16 +89,19 @@ impl DeformableModel {
     /// solid element: tetrahedra, or the domains around edges that stand for them; and with the place of its region.
     pub(crate) fn for_each_solid(&self, mut with: impl FnMut(usize, &[u32], &[Vec3], f64)) {
         for (k, region) in self.regions.iter().enumerate() {
-            self.for_each_solid_of(region, |nodes, gradients, volume| with(k, nodes, gradients, volume));
+            self.for_each_solid_of(region, |element| {
+                with(k, element.nodes, element.gradients, element.volume);
+            });
         }
     }
 
-    fn for_each_solid_of(&self, region: &Region, mut with: impl FnMut(&[u32], &[Vec3], f64)) {
+    fn for_each_solid_of(&self, region: &Region, mut with: impl FnMut(&SolidElement<'_>)) {
         if self.is_smoothed() {
             return self.domains.for_each(region.domains.clone(), with);
         }
-        for (nodes, gradients, volume) in self.shaped_tetrahedra(region) {
-            with(&nodes, &gradients, volume);
+        for (k, (nodes, gradients, volume)) in self.shaped_tetrahedra(region).enumerate() {
+            let place = [region.blocks.start + k / LANES, k % LANES];
+            with(&SolidElement { nodes: &nodes, gradients: &gradients, volume, place });
         }
     }
 
@@ -91,25 +110,21 @@ impl DeformableModel {
     pub(crate) fn for_each_energy(
         &self,
         materials: &[DeformableMaterial],
-        mut with: impl FnMut(&Law<'_>, &[u32], &[Vec3], f64),
+        mut with: impl FnMut(&Law<'_>, &SolidElement<'_>),
     ) {
-        for (region, material) in self.regions.iter().zip(materials) {
+        for (k, (region, material)) in self.regions.iter().zip(materials).enumerate() {
             let lame = material.lame();
+            let law = Law { material, lame, region: k, is_patch: false };
             if !self.is_smoothed() {
-                let law = Law { material, lame };
-                self.for_each_solid_of(region, |nodes, gradients, volume| {
-                    with(&law, nodes, gradients, volume)
-                });
+                self.for_each_solid_of(region, |element| with(&law, element));
                 continue;
             }
             let ([shape, volume], bare) = (lame.split(), material.without_limits());
-            let law = Law { material, lame: shape };
-            let domains = region.domains.clone();
-            self.domains.for_each(domains, |nodes, gradients, own| with(&law, nodes, gradients, own));
+            let law = Law { lame: shape, ..law };
+            self.domains.for_each(region.domains.clone(), |element| with(&law, element));
             if lame.lambda > 0.0 {
-                let (law, domains) = (Law { material: &bare, lame: volume }, region.patches.clone());
-                self.volume_domains
-                    .for_each(domains, |nodes, gradients, own| with(&law, nodes, gradients, own));
+                let law = Law { material: &bare, lame: volume, is_patch: true, ..law };
+                self.volume_domains.for_each(region.patches.clone(), |element| with(&law, element));
             }
         }
     }

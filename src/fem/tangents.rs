@@ -1,6 +1,7 @@
 //! Stiffness of a body's elements at a state, block by block, as Newton's method wants it.
 
 use super::model::Elements;
+use super::solid_elements::SolidElement;
 use super::thin_elements::{length_energy, membrane};
 use crate::energy::membrane::MembraneMode;
 use crate::energy::{ElementEnergy, Mode, modes, with_energy};
@@ -19,8 +20,9 @@ pub(crate) fn add_tangents(
     let Elements { model, materials, activations } = elements;
     let kept = |stiffness: f64| if projected { stiffness.max(0.0) } else { stiffness };
     let mut sides = Vec::new();
-    model.for_each_energy(materials, |law, nodes, gradients, volume| {
+    model.for_each_energy(materials, |law, element| {
         let (material, lame) = (law.material, law.lame);
+        let SolidElement { nodes, gradients, volume, .. } = *element;
         let F =
             nodes.iter().zip(gradients).fold(Mat3::zeros(), |F, (&n, g)| F + x[n as usize] * g.transpose());
         let modes: [Mode; 9] = with_energy!(material, lame, energy => modes(&F, |s| energy.principal(s)));

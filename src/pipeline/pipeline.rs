@@ -130,7 +130,7 @@ impl DeformablePipeline {
             return Err(DeformableBodyError::TimeStep { dt: h });
         }
         for (_, body) in deformables.iter().filter(|(_, b)| b.is_enabled()) {
-            let near = body.state.factor_base.step_near(h);
+            let near = body.matrix_step(h);
             self.scratch.factors.prepare_surface(&FactorKey::new(body, near), body);
             if body.settings().integrator == Integrator::Bdf2 {
                 let key = FactorKey::new(body, SECOND_ORDER * near);

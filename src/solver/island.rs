@@ -291,7 +291,7 @@ impl Island {
 /// Bodies in contact that do not bend take the plain iteration: it needs two or three steps there,
 /// and a quasi-Newton update would feed the last digits of the contact forces back into them.
 fn acceleration_of(body: &BodyProblem, contacts: &ContactSystem) -> Acceleration {
-    let is_newton = body.settings.solver == Solver::Newton;
-    let plain = is_newton || (!contacts.is_empty() && !body.preconditioner.is_per_node());
+    let takes_none = matches!(body.settings.solver, Solver::Newton | Solver::Xpbd);
+    let plain = takes_none || (!contacts.is_empty() && !body.preconditioner.is_per_node());
     if plain { Acceleration::None } else { body.settings.acceleration }
 }

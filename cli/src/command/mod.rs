@@ -11,6 +11,7 @@ macro_rules! say {
 mod bless;
 mod check;
 mod drifts;
+mod files_for_others;
 mod fit;
 mod new;
 mod progress;

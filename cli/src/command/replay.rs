@@ -1,13 +1,19 @@
 //! `foible replay`.
 
+use super::files_for_others::FilesForOthers;
 use super::{MET, parse_set};
 use crate::picture::{Film, Look, write_gif, write_png};
 use crate::run::{RunOptions, run};
 use crate::scene::SceneFile;
+use foible3d::DeformableWorld;
+use rapier3d::prelude::PhysicsWorld;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example: foible replay drop.toml --gif drop.gif --size 480x270")]
+#[command(after_help = "Examples:
+  foible replay drop.toml --gif drop.gif --size 480x270
+  foible replay drop.toml --png end.png --stress 20e3
+  foible replay drop.toml --glb drop.glb --vtu drop.pvd --rate 60")]
 pub(super) struct Replay {
     /// A scene file.
     scene: PathBuf,
@@ -17,10 +23,19 @@ pub(super) struct Replay {
     /// Writes a film.
     #[arg(long)]
     gif: Option<PathBuf>,
+    /// Writes glTF with an animation, for any viewer.
+    #[arg(long)]
+    glb: Option<PathBuf>,
+    /// Writes a series for ParaView, FILE.pvd with a .vtu for each frame beside it.
+    #[arg(long)]
+    vtu: Option<PathBuf>,
+    /// Colours bodies by von Mises stress, red from this one on [Pa].
+    #[arg(long)]
+    stress: Option<f32>,
     /// Time of the picture \[s\]; the end if not given.
     #[arg(long)]
     at: Option<f64>,
-    /// Pictures per second of the film.
+    /// Pictures per second of the film, and frames of the files.
     #[arg(long, default_value_t = 25.0)]
     rate: f64,
     /// Width and height in pixels.
@@ -49,8 +64,12 @@ fn parse_size(text: &str) -> Result<[usize; 2], String> {
 
 impl Replay {
     pub fn main(&self) -> Result<u8, String> {
-        if self.png.is_none() && self.gif.is_none() {
-            return Err("name what to write: --png FILE or --gif FILE".into());
+        let pictures = self.png.is_some() || self.gif.is_some();
+        if !pictures && self.glb.is_none() && self.vtu.is_none() {
+            return Err("name what to write: --png FILE, --gif FILE, --glb FILE or --vtu FILE".into());
+        }
+        if let Some(stress) = self.stress.filter(|stress| !(*stress > 0.0 && stress.is_finite())) {
+            return Err(format!("--stress {stress} must be positive"));
         }
         if !(self.rate > 0.0 && self.rate <= 100.0) {
             return Err(format!("--rate {} must be between 0 and 100", self.rate));
@@ -58,10 +77,26 @@ impl Replay {
         let file =
             SceneFile::read(&self.scene, &self.set).map_err(|e| format!("{}: {e}", self.scene.display()))?;
         // A picture may be of any step.
-        let rate = if self.gif.is_some() { self.rate } else { 1.0 / file.scene.steps().1 };
-        let made = run(&file, &RunOptions { replay_rate: rate, progress: None });
-        let replay = made.replay.ok_or_else(|| made.outcome.error.unwrap_or_default())?;
-        let look = Look { size: self.size, yaw: self.yaw, pitch: self.pitch };
+        let rate = match (self.gif.is_some(), self.png.is_some()) {
+            (true, _) => self.rate,
+            (_, true) => 1.0 / file.scene.steps().1,
+            _ => 0.0,
+        };
+        let files = FilesForOthers::begin(self.glb.as_deref(), self.vtu.as_deref(), self.rate)?;
+        let seen =
+            |time: f64, physics: &PhysicsWorld, world: &DeformableWorld| files.record(time, physics, world);
+        let made = run(&file, &RunOptions { replay_rate: rate, progress: None, seen: Some(&seen) });
+        if let Some(error) = made.outcome.error {
+            return Err(error);
+        }
+        for path in files.end()? {
+            say!("{} is written", path.display());
+        }
+        if !pictures {
+            return Ok(MET);
+        }
+        let replay = made.replay.ok_or("there is no picture of the run")?;
+        let look = Look { size: self.size, yaw: self.yaw, pitch: self.pitch, stress: self.stress };
         let film = Film::new(&replay, look);
         if let Some(path) = &self.png {
             write_png(&film, path, self.at.unwrap_or(f64::INFINITY))?;

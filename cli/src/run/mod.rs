@@ -19,6 +19,8 @@ pub use trace::Trace;
 
 use crate::scene::{Expect, Kind, Quantity, Scene, SceneFile};
 use crate::stage::{self, Stage};
+use foible3d::DeformableWorld;
+use rapier3d::prelude::PhysicsWorld;
 use recorded::Recorded;
 use signals::Signals;
 
@@ -30,7 +32,12 @@ pub struct RunOptions<'a> {
     pub replay_rate: f64,
     /// Called before every step with the number of those that are done; false stops.
     pub progress: Option<&'a (dyn Fn(u64) -> bool + Sync)>,
+    /// Called before the first step and after every one with the time \[s\] and the worlds; an error ends the run.
+    pub seen: Option<&'a Seen<'a>>,
 }
+
+/// Sees a run as it goes on.
+pub type Seen<'a> = dyn Fn(f64, &PhysicsWorld, &DeformableWorld) -> Result<(), String> + Sync + 'a;
 
 /// A run with all that is left of it.
 #[derive(Clone, Debug)]
@@ -96,6 +103,13 @@ fn steps(
     let watches_losses = watched.any(|e| e.quantity.as_ref().is_of_steps());
     run.trace = Trace::new(stage);
     run.replay = (options.replay_rate > 0.0).then(|| replay::replay_of(scene, stage, options.replay_rate));
+    let seen = |time: f64, stage: &Stage| {
+        options.seen.map_or(Ok(()), |seen| seen(time, &stage.physics, &stage.world))
+    };
+    if let Err(what) = seen(0.0, stage) {
+        run.outcome.error = Some(what);
+        return;
+    }
     for step in 1..=steps {
         if options.progress.is_some_and(|goes_on| !goes_on(step - 1)) {
             run.is_stopped = true;
@@ -116,6 +130,10 @@ fn steps(
             replay.record(time, &stage.physics.bodies, &stage.physics.colliders, &stage.world);
         }
         run.outcome.steps = step;
+        if let Err(what) = seen(time, stage) {
+            run.outcome.error = Some(what);
+            return;
+        }
         stage.pull_triggers(scene, time);
     }
     judge(scene, stage, &signals, curves, &mut run.outcome);

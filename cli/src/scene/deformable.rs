@@ -269,6 +269,8 @@ pub enum SolverKind {
     ConjugateGradients,
     /// Gauss–Seidel.
     GaussSeidel,
+    /// Extended position-based dynamics.
+    Xpbd,
     /// Jacobi.
     Jacobi,
     /// Newton's method.

@@ -152,6 +152,7 @@ fn solved_by(builder: DeformableBodyBuilder, asked: &scene::Solver) -> Deformabl
                 scene::SolverKind::Projective => Solver::Projective,
                 scene::SolverKind::ConjugateGradients => Solver::ConjugateGradients,
                 scene::SolverKind::GaussSeidel => Solver::GaussSeidel,
+                scene::SolverKind::Xpbd => Solver::Xpbd,
                 scene::SolverKind::Jacobi => Solver::Jacobi,
                 scene::SolverKind::Newton => Solver::Newton,
             };

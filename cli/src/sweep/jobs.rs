@@ -136,7 +136,7 @@ fn finish(job: &Job, number: usize, options: &JobOptions<'_>) -> Option<Result<D
         !options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     };
     let rate = options.replay_rate.unwrap_or_else(|| replay_rate(&job.file.scene)).max(0.0);
-    let run_options = RunOptions { replay_rate: rate, progress: Some(&progress) };
+    let run_options = RunOptions { replay_rate: rate, progress: Some(&progress), seen: None };
     // One case that breaks is not to end the others.
     let mut run = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run(&job.file, &run_options)))
         .unwrap_or_else(|panic| broken(job, &*panic));

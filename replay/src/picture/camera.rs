@@ -54,6 +54,11 @@ impl Camera {
         [point.x / (point.z * HALF_VIEW), point.y / (point.z * HALF_VIEW), point.z]
     }
 
+    /// Whether a point is seen at all.
+    pub fn is_before_the_eye(&self, point: Vector) -> bool {
+        self.frame(point).z >= self.near
+    }
+
     /// The part of a triangle of that frame that is before the eye: none, three or four corners in order.
     pub fn before_the_eye(&self, triangle: [Vector; 3]) -> Vec<Vector> {
         let mut kept = Vec::with_capacity(4);

@@ -6,7 +6,7 @@ mod raster;
 use crate::replay::{Replay, ReplayFrame, ReplayMesh};
 use camera::Camera;
 use rapier3d::prelude::*;
-use raster::Raster;
+use raster::{Paint, Raster};
 
 /// Samples per pixel along each side.
 const OVERSAMPLING: usize = 2;
@@ -32,6 +32,15 @@ pub struct Look {
     pub yaw: f32,
     /// From how high \[degrees\].
     pub pitch: f32,
+    /// Colours soft bodies by von Mises stress, blue at none and red from this one on \[Pa\]; each its own colour without.
+    pub stress: Option<f32>,
+}
+
+impl Default for Look {
+    /// 640 by 480 pixels, from the side and a little from above.
+    fn default() -> Self {
+        Self { size: [640, 480], yaw: 35.0, pitch: 20.0, stress: None }
+    }
 }
 
 /// A replay seen by one camera.
@@ -71,7 +80,9 @@ impl<'a> Film<'a> {
 
     /// Rows of sRGB bytes of the picture nearest to a time \[s\].
     pub fn picture(&self, time: f64) -> Vec<u8> {
-        let off = |(_, frame): &(usize, &ReplayFrame)| (frame.time - time.min(f64::MAX)).abs();
+        // Beyond the last all are as far away as it is, to rounding.
+        let time = self.replay.frames.last().map_or(time, |last| time.min(last.time));
+        let off = |(_, frame): &(usize, &ReplayFrame)| (frame.time - time).abs();
         let frames = self.replay.frames.iter().enumerate();
         let Some(frame) = frames.min_by(|a, b| off(a).total_cmp(&off(b))) else {
             return Vec::new();
@@ -92,7 +103,15 @@ impl<'a> Film<'a> {
             if places.is_empty() {
                 continue;
             }
+            let stresses = self.look.stress.filter(|_| mesh.is_soft).map(|most| {
+                let own = &frame.1.stresses[soft - mesh.vertices.len()..soft];
+                own.iter().map(|s| (s / most).clamp(0.0, 1.0)).collect::<Vec<f32>>()
+            });
             for triangle in &mesh.triangles {
+                let paint = match &stresses {
+                    Some(shares) => Paint::Heat(triangle.map(|v| shares[v as usize])),
+                    None => Paint::Plain(paint),
+                };
                 raster.triangle(&self.camera, triangle.map(|v| places[v as usize]), paint);
             }
         }

@@ -106,6 +106,7 @@ pub(super) fn store(
         body.state.history.x.clear();
         body.state.history.v.clear();
     }
+    body.state.history.held = problem.held_energy();
     body.advance_pins(h);
     body.before.clone_from(&body.state.x);
     body.state.x.clone_from(&problem.current.x);

@@ -44,6 +44,7 @@ impl BodyProblem {
             contact_change: Vec::new(),
             preconditioner: Preconditioner::default(),
             limiting: Default::default(),
+            xpbd: Default::default(),
             step_damping: 1.0,
             guard_retries: 0,
             is_rejected: false,
@@ -98,7 +99,7 @@ impl BodyProblem {
             Scheme::Bdf2 => SECOND_ORDER * dt,
             Scheme::GeneralizedAlpha => alpha_step(dt),
         };
-        let near = step(body.state.factor_base.step_near(self.dt));
+        let near = step(body.matrix_step(self.dt));
         self.h = step(self.dt);
         (self.reach, self.scale) = if self.is_alpha() { (self.dt, SCALE) } else { (self.h, 1.0) };
         self.key.update(body, near, self.prescribed.iter().map(|p| p.node));
@@ -116,6 +117,7 @@ impl BodyProblem {
         self.kinetic_bound = f64::INFINITY;
         self.preconditioner.counters = SolveCounters::default();
         self.read_state(body);
+        self.read_held_energy(&body.state.history);
         self.set_targets(body, gravity);
         let n = self.x_start.len();
         self.contact_force.clear();

@@ -70,7 +70,7 @@ impl BodyProblem {
         still.x.clear();
         still.x.extend_from_slice(self.origin().0);
         self.evaluate(&mut still, f64::INFINITY);
-        let elastic = still.elastic;
+        let elastic = self.xpbd_start_energy().unwrap_or(still.elastic);
         self.trial = still;
         elastic + self.kinetic_energy(self.origin().1.iter())
     }
@@ -106,7 +106,7 @@ impl BodyProblem {
                 (self.fall[i] * *m + self.contact_force[i]).dot(&moved)
             };
         }
-        self.kinetic_bound = start + work - self.current.elastic + ROUNDED * start;
+        self.kinetic_bound = start + work - self.elastic_energy() + ROUNDED * start;
         let mut v = std::mem::take(&mut self.force);
         self.unlimited_velocities(in_flight, &mut v);
         let held = self.kinetic_energy(v.iter());

@@ -20,6 +20,11 @@ impl BodyProblem {
     /// Chooses where the iteration starts, and the frames of the preconditioner: the rigidly extrapolated
     /// shape or the inertial target, whichever has the lower Ψ; of a pinned body where it is, if that has much less.
     pub fn choose_initial_guess(&mut self, factor: &SystemFactor) {
+        if self.is_xpbd() {
+            self.frame = Mat3::identity();
+            self.preconditioner.set_isotropic();
+            return self.begin_xpbd();
+        }
         let is_pinned = !self.key.pins.is_empty();
         let drifts = is_pinned || self.is_alpha();
         if drifts {

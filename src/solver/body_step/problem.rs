@@ -6,6 +6,7 @@
 
 use super::cavities::FilledCavity;
 use super::generalized_alpha::{ALPHA_F, AlphaStart};
+use super::xpbd::XpbdState;
 use crate::body::{Impact, PrescribedNode, SolverSettings};
 use crate::fem::elastic_forces::Evaluation;
 use crate::fem::{Dampers, DeformableModel, Elements, HardLimiting, StiffnessDamping, elastic_forces};
@@ -90,6 +91,7 @@ pub(crate) struct BodyProblem {
     pub contact_change: Vec<Vec3>,
     pub preconditioner: Preconditioner,
     pub limiting: HardLimiting,
+    pub(super) xpbd: XpbdState,
     /// Factor c ≥ 1 on A, raised by the guard.
     pub step_damping: f64,
     pub guard_retries: usize,
@@ -180,8 +182,11 @@ impl BodyProblem {
         self.dt
     }
 
-    /// Sets the trial to `x + P(r + Jᵀλ⁰)/c`.
+    /// Sets the trial to `x + P(r + Jᵀλ⁰)/c`, or to where a sweep over constraints leads.
     pub fn free_step(&mut self, factor: &SystemFactor) {
+        if self.is_xpbd() {
+            return self.sweep_constraints();
+        }
         let mut force = std::mem::take(&mut self.force);
         self.free_residual(&mut force);
         self.step_by(factor, &force);
@@ -224,7 +229,11 @@ impl BodyProblem {
     /// it takes back draws contacts apart rather than together. Gives the rotation \[rad\] where it was bent, else zero: contacts
     /// then want another iteration.
     pub fn bend_step_to_rotation(&mut self) -> f64 {
-        if self.preconditioner.is_per_node() || !self.key.pins.is_empty() {
+        // What a sweep turns it has turned as a whole.
+        if self.preconditioner.is_per_node()
+            || !self.key.pins.is_empty()
+            || (self.is_xpbd() && !self.preconditioner.is_rigid())
+        {
             return 0.0;
         }
         let (_, centre) = centre_of_mass(&self.current.x, &self.masses);
@@ -326,6 +335,10 @@ impl BodyProblem {
     /// The guard [cf. Nocedal & Wright 2006, sufficient decrease]:
     /// `Ψ(x + d) − λᵀJd ≤ Ψ(x) − 0.1·dᵀ(r + Jᵀλ)`.
     pub fn trial_descends(&self) -> bool {
+        // Sweeps ascend in the multipliers: on the way they may raise Ψ.
+        if self.is_xpbd() {
+            return self.trial.objective.is_finite();
+        }
         let (mut by_contact, mut by_residual) = (0.0, 0.0);
         for i in 0..self.trial.x.len() {
             let d = self.trial.x[i] - self.current.x[i];
@@ -344,6 +357,7 @@ impl BodyProblem {
     }
 
     pub fn accept_trial(&mut self) {
+        self.feel_contacts();
         std::mem::swap(&mut self.current, &mut self.trial);
     }
 

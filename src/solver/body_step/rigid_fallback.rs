@@ -27,11 +27,11 @@ impl BodyProblem {
         let mut still = std::mem::take(&mut self.trial);
         still.x.clone_from(&self.x_start);
         self.evaluate(&mut still, f64::INFINITY);
-        let before = still.elastic;
+        let before = self.xpbd_start_energy().unwrap_or(still.elastic);
         self.trial = still;
         let mut ends = std::mem::take(&mut self.force);
         self.unlimited_velocities(false, &mut ends);
-        let (mut kinetic, mut gained, mut by_contact) = (0.0, self.current.elastic - before, 0.0);
+        let (mut kinetic, mut gained, mut by_contact) = (0.0, self.elastic_energy() - before, 0.0);
         let mut pins = self.key.pins.iter().peekable();
         for (i, m) in self.masses.iter().enumerate() {
             let moved = self.current.x[i] - self.x_start[i];
@@ -49,7 +49,8 @@ impl BodyProblem {
             by_contact += contact;
         }
         self.force = ends;
-        let iterations = self.settings.max_iterations.max(1) as f64;
+        // Each sweep of constraints leaves about as much as the one before.
+        let iterations = if self.is_xpbd() { 1.0 } else { self.settings.max_iterations.max(1) as f64 };
         let share = MAX_GAIN / iterations;
         let allowed = share * (before + kinetic) + MAX_GAIN_OF_WORK * by_contact.abs();
         // Written so that NaN counts as gained.

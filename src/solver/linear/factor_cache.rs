@@ -6,7 +6,7 @@
 use super::affine_modes::CoarseInverse;
 use super::changed_pins::ChangedPins;
 use super::clusters::Clusters;
-use super::coefficients::dimension;
+use super::coefficients::{dimension, node_inertia};
 use super::compliance_columns::ComplianceColumns;
 use super::factor::{BATCH, FactorScratch, Symbolic};
 use super::factor_values::Factor;
@@ -206,7 +206,7 @@ impl FactorCache {
 
     /// The pattern of a body's matrix, made once per model.
     fn pattern(&mut self, key: &FactorKey, body: &DeformableBody) -> Option<Arc<Symbolic>> {
-        let has_matrix = key.solver != Solver::ConjugateGradients;
+        let has_matrix = !matches!(key.solver, Solver::ConjugateGradients | Solver::Xpbd);
         let name = (key.model, key.system, has_matrix);
         if let Some(symbolic) = self.symbolic.get(&name) {
             return Some(symbolic.clone());
@@ -323,6 +323,13 @@ impl FactorCache {
             let coarse = CoarseInverse { local: operator.local_compliance(), modes: None };
             return Some((Factor::Iterative(Box::new(operator)), coarse));
         }
+        if key.solver == Solver::Xpbd {
+            let inertia = node_inertia(&body.model, &body.materials, h);
+            let mut mobility: Vec<f64> = inertia.into_iter().map(|m| 1.0 / m).collect();
+            let factor = Factor::Jacobi(mobility.clone());
+            key.pins.iter().for_each(|&p| mobility[p as usize] = 0.0);
+            return Some((factor, CoarseInverse { local: mobility, modes: None }));
+        }
         let values = system::assemble(&body.model, &body.materials, &key.pins, key.system, h, symbolic);
         let coarse = match key.solver {
             Solver::Projective | Solver::ConjugateGradients => {
@@ -339,7 +346,9 @@ impl FactorCache {
             }
             Solver::GaussSeidel => Factor::GaussSeidel(values),
             // Newton's method makes its own, and falls back on this.
-            Solver::Jacobi | Solver::Newton => Factor::Jacobi(symbolic.upper(&values).inverse_row_sums()),
+            Solver::Jacobi | Solver::Newton | Solver::Xpbd => {
+                Factor::Jacobi(symbolic.upper(&values).inverse_row_sums())
+            }
         };
         Some((factor, coarse))
     }

@@ -99,11 +99,14 @@ impl FactorKey {
         self.solver = body.settings().solver;
         self.system = match self.solver {
             Solver::Newton => SystemMatrix::RestStiffness,
+            Solver::Xpbd => SystemMatrix::Laplacian,
             _ => body.settings().system,
         };
         self.precision = body.settings().precision;
         self.clusters = match self.system {
-            SystemMatrix::Laplacian if body.model.is_solid() => body.settings().clusters,
+            SystemMatrix::Laplacian if body.model.is_solid() && self.solver != Solver::Xpbd => {
+                body.settings().clusters
+            }
             _ => 0,
         };
         self.step = h.to_bits();
