@@ -70,3 +70,72 @@ fn a_damped_slide_falls_with_a_soft_load_as_with_a_rigid_one() {
     }
     println!("at {} of {y} m", physics.bodies[slide].translation().y);
 }
+
+/// Two jaws on a base, of which the second follows the first by a ratio, and a soft cube between them; no gravity. What both
+/// press with, and the first's motor \[N\] or \[N m\].
+fn jaws(turning: bool, ratio: f32) -> [f64; 3] {
+    let (mut physics, mut deformables) = (PhysicsWorld::new(), DeformableWorld::new());
+    physics.gravity = Vector::ZERO;
+    let base = physics.insert_body(RigidBodyBuilder::fixed());
+    let mut jaw = |side: f32| {
+        let (at, anchor) = (Vector::X * 0.11 * side, Vector::NEG_Y * 0.4);
+        let shape = ColliderBuilder::cuboid(0.01, 0.05, 0.05).mass(0.1).friction(1.0);
+        let (jaw, collider) =
+            physics.insert(RigidBodyBuilder::dynamic().translation(at).can_sleep(false), shape);
+        let joint: GenericJoint = match turning {
+            true => {
+                RevoluteJointBuilder::new(Vector::Z).local_anchor1(at + anchor).local_anchor2(anchor).into()
+            }
+            false => PrismaticJointBuilder::new(Vector::X).local_anchor1(at).into(),
+        };
+        (physics.multibody_joints.insert(base, jaw, joint, true).unwrap(), collider)
+    };
+    let ((first, left), (second, right)) = (jaw(-1.0), jaw(1.0));
+    let axis = if turning { JointAxis::AngX } else { JointAxis::LinX };
+    let (_, link2) = physics.multibody_joints.get(second).unwrap();
+    let (multibody, link1) = physics.multibody_joints.get_mut(first).unwrap();
+    let axes = axis as usize;
+    let coupling = MultibodyDofCoupling {
+        link1,
+        dof1: 0,
+        axis1: axes,
+        link2,
+        dof2: 0,
+        axis2: axes,
+        coeff: ratio,
+        offset: 0.0,
+    };
+    multibody.add_dof_coupling(coupling);
+    // Turned about z, what is above the axis goes to the left: closing is negative.
+    let (sign, target) = if turning { (-1.0, 0.08) } else { (1.0, 0.03) };
+    let joint = &mut multibody.link_mut(link1).unwrap().joint.data;
+    joint.set_motor_position(axis, sign * target, 1000.0, 20.0);
+    joint.set_motor_model(axis, MotorModel::ForceBased);
+    let material =
+        DeformableMaterial::new(2.0e5, 0.3).mass_damping(2.0).stiffness_damping(2.0e-3).friction(1.0);
+    let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.09), [4; 3]).material(material).can_sleep(false);
+    deformables.insert(cube).unwrap();
+    (0..400).for_each(|_| deformables.step(&mut physics));
+    let (multibody, _) = physics.multibody_joints.get(first).unwrap();
+    let q = multibody.link(link1).unwrap().joint.coords()[axes];
+    // About the axes of the jaws, or along their way.
+    let force = |jaw: ColliderHandle, side: f32| {
+        let moment = |c: &DeformableContact| {
+            let arm = c.point - Vector::new(0.11 * side, -0.4, 0.0);
+            f64::from(if turning { arm.x * c.force.y - arm.y * c.force.x } else { c.force.x })
+        };
+        deformables.contacts_with(jaw).map(moment).sum::<f64>().abs()
+    };
+    [force(left, -1.0), force(right, 1.0), 1000.0 * f64::from(target - sign * q)]
+}
+
+#[test]
+fn a_jaw_that_follows_presses_as_hard_as_the_one_that_is_driven() {
+    for turning in [false, true] {
+        let [left, right, motor] = jaws(turning, -1.0);
+        // The motor bears both, which are alike.
+        println!("turning {turning}: {left:.4} and {right:.4}, motor {motor:.4}");
+        assert!(motor > 4.0 && (left / right - 1.0).abs() < 0.02, "{left} {right} {motor}");
+        assert!(((left + right) / motor - 1.0).abs() < 0.02, "{left} {right} {motor}");
+    }
+}

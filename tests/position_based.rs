@@ -89,7 +89,7 @@ fn sweeps_come_near_the_solution_of_newtons_method() {
     for (name, builder) in kinds() {
         let errors_at = |h: f32| {
             let truth = one_step(&builder, newton(), h);
-            [1, 10, 100, 1000].map(|n| distance(&one_step(&builder, xpbd(n), h), &truth))
+            [1, 10, 100, 300].map(|n| distance(&one_step(&builder, xpbd(n), h), &truth))
         };
         let (errors, short) = (errors_at(1.0 / 60.0), errors_at(1.0 / 600.0));
         println!("{name:<10} {errors:?} m, at 1/600 s {short:?} m");
@@ -117,7 +117,8 @@ fn largest_energy(stiffness: f64, h: f32, sweeps: usize, on_floor: bool) -> f64 
     world.bodies[bar].set_angvel(Vector::new(0.0, 3.0, 4.0)).unwrap();
     let energy = |body: &DeformableBody| body.kinetic_energy() + body.mass() * g * body.center_of_mass()[1];
     let start = energy(&world.bodies[bar]);
-    let steps = ((2.0 / h) as usize).clamp(10, 200);
+    // It lands after 0.38 s.
+    let steps = ((1.0 / h) as usize).clamp(10, if on_floor { 500 } else { 40 });
     let mut largest = 0.0_f64;
     for _ in 0..steps {
         world.step(&mut physics);
@@ -151,15 +152,15 @@ fn no_energy_is_made_at_the_extremes_by_one_sweep_or_ten() {
 fn a_cube_holds_a_plate_of_its_weight_and_more() {
     let (mut physics, floor) = common::world_with_floor(1.0 / 60.0);
     let mut world = DeformableWorld::new();
-    let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [4; 3])
+    let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [3; 3])
         .translation(Vector::Y * 0.25)
-        .material(DeformableMaterial::new(3e5, 0.3).mass_damping(1.0))
+        .material(DeformableMaterial::new(3e5, 0.3).mass_damping(4.0))
         .settings(xpbd(50))
         .can_sleep(false);
     let cube = world.insert(cube).unwrap();
     let plate = RigidBodyBuilder::dynamic().translation(Vector::Y * 0.5).can_sleep(false);
     let (plate, _) = physics.insert(plate, ColliderBuilder::cuboid(0.15, 0.02, 0.15).density(5000.0));
-    for _ in 0..200 {
+    for _ in 0..120 {
         world.step(&mut physics);
     }
     let weight = (world.bodies[cube].mass() + f64::from(physics.bodies[plate].mass())) * G;
@@ -209,12 +210,12 @@ fn a_filled_room_comes_to_the_pressure_of_its_gas() {
             exponent: 1.4,
         };
         world.bodies[ball].fill_cavity(0, Some(gas)).unwrap();
-        for _ in 0..60 {
+        for _ in 0..20 {
             world.step(&mut physics);
         }
         world.bodies[ball].cavity_volume(0).unwrap()
     };
-    let (own, truth) = (volume_with(xpbd(200)), volume_with(newton()));
+    let (own, truth) = (volume_with(xpbd(100)), volume_with(newton()));
     println!("{own} {truth}");
     assert!((own / truth - 1.0).abs() < 1e-3, "{own} {truth}");
 }
@@ -235,7 +236,7 @@ fn stack() -> (PhysicsWorld, DeformableWorld, [DeformableBodyHandle; 2]) {
     let mut world = DeformableWorld::new();
     let material = DeformableMaterial::new(2e5, 0.3).mass_damping(2.0).friction(1.0);
     let cube = |y: f32| {
-        let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [3; 3]).translation(Vector::Y * y);
+        let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [2; 3]).translation(Vector::Y * y);
         cube.material(material).can_sleep(false)
     };
     let below = world.insert(cube(0.25)).unwrap();
@@ -246,7 +247,7 @@ fn stack() -> (PhysicsWorld, DeformableWorld, [DeformableBodyHandle; 2]) {
 #[test]
 fn a_cube_lies_on_one_of_another_solver_on_a_mesh() {
     let (mut physics, mut world, [below, above]) = stack();
-    for _ in 0..240 {
+    for _ in 0..150 {
         world.step(&mut physics);
     }
     let carried: f64 = world.pair_contacts().iter().map(|c| f64::from(c.force.y).abs()).sum();

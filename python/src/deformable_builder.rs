@@ -1,7 +1,7 @@
 //! Builders of deformable bodies: what is set on them.
 
 use crate::arrays::{Placed, Triple, number, points, rows, vertices};
-use crate::enums::{PyBodyType, PyCombineRule, PyFidelity, PyGroups, PyIntegrator};
+use crate::enums::{PyBodyType, PyCombineRule, PyFidelity, PyGroups, PyIntegrator, PySolver};
 use crate::errors::{bad_value, raised, without_panic};
 use crate::material::PyMaterial;
 use foible3d::{DeformableBody, DeformableBodyBuilder, DeformableModel};
@@ -146,6 +146,30 @@ impl PyDeformableBuilder {
         Ok(self.new_of(py, model.with_fibres(|_| told[next.replace(next.get() + 1)])))
     }
 
+    /// Sets the direction of the warp in woven sheets (``Material``'s ``sheet``), projected on each triangle: one vector for all, or a
+    /// function that is called with the middles of all triangles at rest, an array of shape (m, 3) [m], and returns directions, of
+    /// shape (m, 3); where these are zero there is none.
+    fn warp(&self, py: Python<'_>, direction: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if !direction.is_callable() {
+            let along = direction.extract::<Triple>()?.finite("warp")?.to_array().map(f64::from);
+            return Ok(self.new_of(py, self.model.with_warp(|_| along).map_err(raised)?));
+        }
+        let place = |v: u32| self.model.rest_position(v as usize);
+        let middle = |(corners, _): ([u32; 3], u32)| {
+            let [a, b, c] = corners.map(place);
+            [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0)
+        };
+        let middles: Vec<[f64; 3]> = self.model.sheet_triangles().map(middle).collect();
+        let count = middles.len();
+        let told = points(&direction.call1((rows(py, middles)?,))?, "warp")?;
+        if told.len() != count {
+            return Err(bad_value(format!("warp: {} vectors for {count} triangles", told.len())));
+        }
+        let next = Cell::new(0);
+        let model = self.model.with_warp(|_| told[next.replace(next.get() + 1)]);
+        Ok(self.new_of(py, model.map_err(raised)?))
+    }
+
     /// Gives a region a material of its own.
     fn region_material(&self, py: Python<'_>, region: u32, material: PyMaterial) -> Self {
         self.new_with(py, move |b| b.region_material(region, material.0))
@@ -233,6 +257,11 @@ impl PyDeformableBuilder {
     /// Sets how a step goes forward in time.
     fn integrator(&self, py: Python<'_>, integrator: PyIntegrator) -> Self {
         self.new_with(py, move |b| b.tune(|settings| settings.integrator = integrator.into()))
+    }
+
+    /// Sets how the elasticity is solved.
+    fn solver(&self, py: Python<'_>, solver: PySolver) -> Self {
+        self.new_with(py, move |b| b.tune(|settings| settings.solver = solver.into()))
     }
 
     /// Sets the limit of global iterations in a step.

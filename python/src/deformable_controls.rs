@@ -159,6 +159,16 @@ impl PyDeformableBody {
         self.try_with(py, |body| body.set_activation(stretch))
     }
 
+    /// Stretch that the muscle fibres of a region want to have [–]: its own, or the body's.
+    fn region_activation(&self, py: Python<'_>, region: u32) -> PyResult<f64> {
+        self.read(py, |body| body.region_activation(region))
+    }
+
+    /// Gives the muscle fibres of a region a stretch of their own that they want to have [–], 0 to 10.
+    fn set_region_activation(&self, py: Python<'_>, region: u32, stretch: f64) -> PyResult<()> {
+        self.try_with(py, |body| body.set_region_activation(region, stretch))
+    }
+
     /// Factor on gravity [–]. May be set.
     #[getter]
     fn gravity_scale(&self, py: Python<'_>) -> PyResult<f64> {

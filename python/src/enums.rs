@@ -1,6 +1,6 @@
 //! Choices among a few names, and collision groups.
 
-use foible3d::{Elasticity, Fidelity, Integrator};
+use foible3d::{Elasticity, Fidelity, Integrator, Solver};
 use pyo3::prelude::*;
 use rapier3d::dynamics::{CoefficientCombineRule, JointAxis, MotorModel, RigidBodyType};
 use rapier3d::geometry::{Group, InteractionGroups, InteractionTestMode};
@@ -135,6 +135,24 @@ choices! {
         FixedCorotated = "FIXED_COROTATED",
         /// Rubber at large strain.
         NeoHookean = "NEO_HOOKEAN",
+    }
+}
+
+choices! {
+    /// How the elasticity of a body is solved.
+    PySolver = "Solver" of Solver {
+        /// Projective Dynamics, the default of solids and large sheets.
+        Projective = "PROJECTIVE",
+        /// The same matrix by conjugate gradients.
+        ConjugateGradients = "CONJUGATE_GRADIENTS",
+        /// A sweep of Gauss–Seidel over it.
+        GaussSeidel = "GAUSS_SEIDEL",
+        /// Extended position-based dynamics.
+        Xpbd = "XPBD",
+        /// The diagonal that bounds it.
+        Jacobi = "JACOBI",
+        /// Newton's method, the default of ropes and small sheets.
+        Newton = "NEWTON",
     }
 }
 

@@ -78,7 +78,7 @@ mod native {
     #[pymodule_export]
     use crate::enums::{
         PyBodyType, PyCombineRule, PyElasticity, PyFidelity, PyGroups, PyIntegrator, PyJointAxis,
-        PyMotorModel,
+        PyMotorModel, PySolver,
     };
     #[pymodule_export]
     use crate::events::{PyCollisionEvent, PyContactForceEvent};

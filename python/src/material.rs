@@ -2,7 +2,7 @@
 
 use crate::enums::PyElasticity;
 use crate::errors::{bad_value, raised};
-use foible3d::{DeformableMaterial, MaxwellBranch};
+use foible3d::{DeformableMaterial, MaxwellBranch, OrthotropicSheet};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
@@ -12,6 +12,8 @@ use pyo3::types::{PyDict, PyTuple};
 /// friction [–]. ``restitution``: coefficient of restitution [–]. ``mass_damping``: damping by mass [1/s]. ``stiffness_damping``: damping by
 /// stiffness [s]. ``elasticity``: the elastic energy. ``strain_limits``: least and largest principal stretch [–], or None.
 /// ``fibre_modulus``: Young's modulus of muscle fibres [Pa]. ``maxwell_branches``: up to four pairs (ratio [–], time [s]) of springs that give way.
+/// ``hard_strain_limits``: least and largest stretch with which a step may end [–], or None. ``sheet``: of woven sheets Young's moduli along the
+/// warp and the weft [Pa], Poisson's ratio of a pull along the warp, and the shear modulus [Pa], or None; they need a ``warp`` of the body.
 #[pyclass(frozen, eq, from_py_object, name = "Material", module = "foible3d")]
 #[derive(Clone, Copy, PartialEq)]
 pub struct PyMaterial(pub DeformableMaterial);
@@ -22,7 +24,7 @@ impl PyMaterial {
     #[new]
     #[pyo3(signature = (youngs_modulus, poisson_ratio, *, density = 1000.0, friction = 0.5, restitution = 0.0, mass_damping = 0.0,
         stiffness_damping = 0.0, elasticity = PyElasticity::LinearCorotated, strain_limits = None, fibre_modulus = 0.0,
-        maxwell_branches = Vec::new()))]
+        maxwell_branches = Vec::new(), hard_strain_limits = None, sheet = None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
     fn new(
         youngs_modulus: f64,
@@ -36,6 +38,8 @@ impl PyMaterial {
         strain_limits: Option<(f64, f64)>,
         fibre_modulus: f64,
         maxwell_branches: Vec<(f64, f64)>,
+        hard_strain_limits: Option<(f64, f64)>,
+        sheet: Option<(f64, f64, f64, f64)>,
     ) -> PyResult<Self> {
         let mut material = DeformableMaterial::new(youngs_modulus, poisson_ratio)
             .density(density)
@@ -46,6 +50,10 @@ impl PyMaterial {
             .elasticity(elasticity.into())
             .fibre_modulus(fibre_modulus);
         material.strain_limits = strain_limits.map(<[f64; 2]>::from);
+        material.hard_strain_limits = hard_strain_limits.map(<[f64; 2]>::from);
+        material.orthotropic = sheet.map(|(warp_modulus, weft_modulus, poisson_ratio, shear_modulus)| {
+            OrthotropicSheet { warp_modulus, weft_modulus, poisson_ratio, shear_modulus }
+        });
         let most = material.maxwell_branches.len();
         if maxwell_branches.len() > most {
             let given = maxwell_branches.len();
@@ -55,6 +63,23 @@ impl PyMaterial {
             *own = MaxwellBranch { ratio, time };
         }
         Self::checked(material)
+    }
+
+    /// Woven cloth: Young's moduli along the warp and the weft [Pa], Poisson's ratio of a pull along the warp, and the shear modulus
+    /// [Pa]. The bodies it is given to need a ``warp``. Young's modulus is then that of bending.
+    #[staticmethod]
+    fn orthotropic_sheet(
+        warp_modulus: f64,
+        weft_modulus: f64,
+        poisson_ratio: f64,
+        shear_modulus: f64,
+    ) -> PyResult<Self> {
+        Self::checked(DeformableMaterial::orthotropic_sheet(
+            warp_modulus,
+            weft_modulus,
+            poisson_ratio,
+            shear_modulus,
+        ))
     }
 
     /// Rubber of this Shore A hardness, 20 to 80; ``smoothed`` elements suit it.
@@ -203,6 +228,19 @@ impl PyMaterial {
         branches.map(|branch| (branch.ratio, branch.time)).collect()
     }
 
+    /// Least and largest stretch with which a step may end [–], or None.
+    #[getter]
+    fn hard_strain_limits(&self) -> Option<(f64, f64)> {
+        self.0.hard_strain_limits.map(Into::into)
+    }
+
+    /// Constants of woven sheets, or None.
+    #[getter]
+    fn sheet(&self) -> Option<(f64, f64, f64, f64)> {
+        let own = self.0.orthotropic?;
+        Some((own.warp_modulus, own.weft_modulus, own.poisson_ratio, own.shear_modulus))
+    }
+
     fn __repr__(&self) -> String {
         let m = &self.0;
         format!(
@@ -238,7 +276,7 @@ impl PyMaterial {
             ($($name:ident)*) => { $(all.set_item(stringify!($name), self.$name())?;)* };
         }
         tell!(youngs_modulus poisson_ratio density friction restitution mass_damping stiffness_damping elasticity
-            strain_limits fibre_modulus maxwell_branches);
+            strain_limits fibre_modulus maxwell_branches hard_strain_limits sheet);
         Ok(all)
     }
 }

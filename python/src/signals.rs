@@ -81,6 +81,12 @@ impl PyActuator {
         Self(Actuator::Activation(body.0))
     }
 
+    /// Stretch that the muscle fibres of a region of a body want to have [–].
+    #[staticmethod]
+    fn region_activation(body: PyDeformableHandle, region: u32) -> Self {
+        Self(Actuator::RegionActivation(body.0, region))
+    }
+
     /// Position that the motor of a joint drives an axis to [m, rad].
     #[staticmethod]
     fn joint_position(joint: PyJointHandle, motor: PyMotorAxis) -> Self {

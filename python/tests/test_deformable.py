@@ -193,6 +193,60 @@ def test_a_muscle_contracts():
         assert np.ptp(body.positions[:, 1]) == pytest.approx(expected, rel=0.02)
 
 
+def test_fibres_of_a_region_contract_alone():
+    world = f.World(gravity=(0, 0, 0))
+    material = f.Material(5e4, 0.3, fibre_modulus=2e5, mass_damping=10.0)
+    bar = f.DeformableBody.cuboid((0.02, 0.15, 0.02), (2, 14, 2), material=material, fibres=(0, 1, 0))
+    body = world.deformable_bodies[world.add_deformable(bar.regions(lambda x: x[:, 1] > 0))]
+    body.set_region_activation(1, 0.6)
+    assert (body.region_activation(0), body.region_activation(1)) == (1.0, 0.6)
+    world.step(240)
+    middle = body.positions[np.abs(body.rest_positions[:, 1]) < 1e-6, 1].mean()
+    expected = 0.15 * (5e4 + 2e5 * 0.6) / 2.5e5
+    assert body.positions[:, 1].max() - middle == pytest.approx(expected, rel=0.03)
+    assert middle - body.positions[:, 1].min() == pytest.approx(0.15, rel=0.03)
+    with pytest.raises(f.DeformableBodyError, match="region"):
+        body.set_region_activation(7, 0.6)
+
+
+def test_woven_cloth_stretches_by_its_threads():
+    # E of a pull along the warp, along the weft: what hangs on two strips.
+    world = f.World(gravity=(0, -9.81, 0))
+    cloth = f.Material.orthotropic_sheet(1e6, 2e5, 0.0, 1e5).replace(mass_damping=20.0, density=500.0)
+    assert cloth.sheet == (1e6, 2e5, 0.0, 1e5)
+    lengths = []
+    for place, along in enumerate((lambda x: np.tile([0.0, 0.0, 1.0], (len(x), 1)), (1, 0, 0))):
+        strip = f.DeformableBody.cloth((0.05, 0.25), (4, 20), 0.001, material=cloth, warp=along)
+        strip = strip.rotation((np.pi / 2, 0, 0)).translation((place, 0, 0)).pinned(lambda x: x[:, 1] > 0.249)
+        body = world.deformable_bodies[world.add_deformable(strip)]
+        lengths.append(body)
+    world.step(400)
+    stretch = [np.ptp(body.positions[:, 1]) - 0.5 for body in lengths]
+    # ρ g L²/(2 E).
+    for own, modulus in zip(stretch, (1e6, 2e5)):
+        assert own == pytest.approx(500 * 9.81 * 0.25 / (2 * modulus), rel=0.1)
+    with pytest.raises(f.DeformableBodyError, match="warp"):
+        world.add_deformable(f.DeformableBody.cloth((0.05, 0.25), (4, 20), 0.001, material=cloth))
+
+
+def test_a_hard_limit_holds():
+    world = f.World()
+    rope = f.DeformableBody.rope([(0, -0.05 * k, 0) for k in range(11)], 0.005)
+    rope = rope.material(f.Material(1e4, 0.3, hard_strain_limits=(0.0, 1.02), mass_damping=2.0)).pinned(lambda x: x[:, 1] > -0.01)
+    body = world.deformable_bodies[world.add_deformable(rope)]
+    world.step(200)
+    assert np.linalg.norm(np.diff(body.positions, axis=0), axis=1).max() < 0.05 * 1.021
+
+
+def test_every_solver_can_be_asked_for():
+    world = f.World(gravity=(0, 0, 0))
+    for k, solver in enumerate((f.Solver.PROJECTIVE, f.Solver.CONJUGATE_GRADIENTS, f.Solver.GAUSS_SEIDEL, f.Solver.XPBD, f.Solver.JACOBI, f.Solver.NEWTON)):
+        cube = f.DeformableBody.cuboid((0.1, 0.1, 0.1), (2, 2, 2), solver=solver, translation=(k, 0, 0), linvel=(0, 1, 0))
+        body = world.deformable_bodies[world.add_deformable(cube)]
+        world.step(6)
+        assert body.linvel == pytest.approx((0, 1, 0), abs=1e-9)
+
+
 def test_bodies_touch_one_another(scene):
     lower, upper = scene.cube(height=0.1), scene.cube(height=0.3)
     scene.world.step(240)

@@ -4,9 +4,9 @@ use crate::error::{RobotError, read_text};
 use crate::hooks::RobotHooks;
 use crate::motor::{change_joint, read_joint, single_axis};
 use crate::part::PlannedPart;
-use crate::passive;
 use crate::rigid::{Inserted, RigidJoint, RigidPart, insert};
 use crate::robot::{Robot, RobotJoint, RobotLink, RobotPart};
+use crate::{mimic, passive};
 use crate::{mjcf, part, urdf};
 use foible3d::{AttachTo, DeformableWorld};
 use rapier3d::prelude::*;
@@ -210,6 +210,8 @@ fn put_in(
 ) -> Result<Robot, RobotError> {
     let inserted = insert(rigid.loaded, physics, solver, self_contacts);
     let joints = name_joints(&rigid.joints, &inserted, physics);
+    let mut warnings = rigid.warnings;
+    mimic::couple(rigid.mimics, &joints, physics, &mut warnings);
     let mut hooks = RobotHooks::new(inserted.hooks);
     let mut put = Vec::with_capacity(parts.len());
     for part in parts {
@@ -219,7 +221,7 @@ fn put_in(
         handles.map(|(body, colliders)| RobotLink { name: link.name, body, colliders })
     });
     let links = links.collect();
-    Ok(Robot { links, joints, parts: put, hooks, gravity: rigid.gravity, warnings: rigid.warnings })
+    Ok(Robot { links, joints, parts: put, hooks, gravity: rigid.gravity, warnings })
 }
 
 fn name_joints(joints: &[RigidJoint], inserted: &Inserted, physics: &mut PhysicsWorld) -> Vec<RobotJoint> {

@@ -27,6 +27,7 @@ mod urdf;
 
 mod hooks;
 
+mod mimic;
 mod motor;
 mod passive;
 mod robot;

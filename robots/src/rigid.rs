@@ -2,6 +2,7 @@
 
 use crate::builder::JointSolver;
 use crate::error::Warning;
+use crate::mimic::Mimic;
 use crate::passive::Passive;
 use rapier3d::prelude::*;
 use rapier3d_mjcf::{MjcfContactHooks, MjcfMultibodyOptions, MjcfRobot};
@@ -50,6 +51,8 @@ pub(crate) struct RigidPart {
     pub loaded: Loaded,
     /// The file's gravity, if it has one [m/s²].
     pub gravity: Option<Vector>,
+    /// Joints that follow others.
+    pub mimics: Vec<Mimic>,
     pub warnings: Vec<Warning>,
 }
 

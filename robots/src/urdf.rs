@@ -5,6 +5,7 @@
 
 use crate::builder::JointSolver;
 use crate::error::{RobotError, Warning};
+use crate::mimic;
 use crate::passive::Passive;
 use crate::rigid::{Loaded, RigidJoint, RigidLink, RigidPart, shapes_of};
 use crate::xml::{Element, parse};
@@ -38,6 +39,7 @@ pub(crate) fn read(
         check_joint(joint, &links, &mut warnings)?;
     }
     check_tree(&joints, &links)?;
+    let mimics = mimic::read(&joints, solver, &mut warnings)?;
     check_masses(&joints, &links, solver)?;
     for other in root.children().filter(|e| !["link", "joint", "material"].contains(&e.tag())) {
         warnings.push(other.warning("is not taken up"));
@@ -69,6 +71,7 @@ pub(crate) fn read(
         links: rigid_links,
         loaded: Loaded::Urdf(robot),
         gravity: None,
+        mimics,
         warnings,
     })
 }
@@ -223,7 +226,7 @@ fn check_joint(
             warnings.push(joint.warning("its friction is not taken up beside its damping"));
         }
     }
-    for tag in ["mimic", "safety_controller", "calibration"] {
+    for tag in ["safety_controller", "calibration"] {
         if joint.child(tag).is_some() {
             warnings.push(joint.warning(format!("<{tag}> is not taken up")));
         }

@@ -110,6 +110,8 @@ pub enum JointRole {
     UpperLimit,
     /// Drives. The motor rests in rapier's own step, so this is all of its force.
     Motor,
+    /// Has it follow another joint of its multibody ([`MultibodyDofCoupling`](rapier3d::dynamics::MultibodyDofCoupling)).
+    Coupling,
 }
 
 /// A direction in which an attachment acts on one of its vertices.

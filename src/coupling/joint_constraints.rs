@@ -23,7 +23,7 @@ pub(super) enum JointName {
 }
 
 impl JointName {
-    fn key(self, axis: u32, role: JointRole) -> ConstraintKey {
+    pub fn key(self, axis: u32, role: JointRole) -> ConstraintKey {
         match self {
             Self::Impulse(handle) => {
                 ConstraintKey::Joint(JointAxis { joint: packed(handle.into_raw_parts()), axis, role })
@@ -46,16 +46,26 @@ pub(super) struct JointEnds {
 }
 
 /// One coordinate of a joint: how it is measured and what moves it.
-struct Coordinate {
-    endpoints: [Endpoint; 2],
-    axis: Vec3,
+pub(super) struct Coordinate {
+    pub endpoints: [Endpoint; 2],
+    pub axis: Vec3,
     /// \[m\] or \[rad\].
-    value: f64,
-    name: JointName,
+    pub value: f64,
+    pub name: JointName,
     /// An angle that is read off a relative rotation, and so does not count turns.
     is_wrapped: bool,
     /// As [`JointAxis::axis`].
-    number: u32,
+    pub number: u32,
+}
+
+/// A coordinate along or about an axis, 0 to 5, of a joint without coupled axes.
+pub(super) fn coordinate(joint: &GenericJoint, axis: usize, ends: &JointEnds) -> Coordinate {
+    let frame1 = ends.poses[0].compose(&Pose64::from_real(&joint.local_frame1));
+    let frame2 = ends.poses[1].compose(&Pose64::from_real(&joint.local_frame2));
+    match axis {
+        0..3 => linear(axis, ends, &frame1, &frame2),
+        _ => angular(axis, joint.locked_axes, ends, &frame1, &frame2),
+    }
 }
 
 /// Limits and forces from here on count as unlimited; rapier's own "unlimited" is `f32::MAX`.

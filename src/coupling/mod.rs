@@ -20,6 +20,7 @@ mod query_colliders;
 mod scene;
 
 mod joint_constraints;
+mod joint_couplings;
 mod neighbourhood;
 mod rigid_contacts;
 mod speculative;

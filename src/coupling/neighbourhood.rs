@@ -6,6 +6,7 @@
 //! to rapier with the rest, so that its own solver finds almost nothing left to do.
 
 use super::joint_constraints::{JointEnds, JointName, drive_constraints, joint_constraints};
+use super::joint_couplings::coupling_constraints;
 use super::parts::StepContext;
 use super::rigid_contacts::{collider_pose, contact_constraints};
 use super::scene::RapierScene;
@@ -13,7 +14,7 @@ use crate::contact::{Candidates, Constraint, ProxyId, SpeculativePoint};
 use crate::math::Pose64;
 use crate::solver::RigidProxy;
 use rapier3d::dynamics::{
-    ImpulseJointHandle, JointAxesMask, MultibodyIndex, MultibodyJoint, RigidBodyHandle,
+    ImpulseJointHandle, JointAxesMask, Multibody, MultibodyIndex, MultibodyJoint, RigidBodyHandle,
 };
 use rapier3d::geometry::ColliderHandle;
 use std::collections::HashSet;
@@ -133,15 +134,18 @@ impl RigidNeighbourhood {
         let index = around.scene.articulated[articulation].multibody;
         let Some(multibody) = around.context.sets.multibody_joints.get_multibody(index) else { return };
         for link in multibody.links() {
-            let Some(parent) = link.parent_id().and_then(|id| multibody.link(id)) else { continue };
-            let handles = [parent.rigid_body_handle(), link.rigid_body_handle()];
-            let Some(mut ends) = around.ends(JointName::Multibody(handles[1]), handles) else { continue };
-            ends.coordinates = own_coordinates(&link.joint);
+            let Some(ends) = around.link_ends(multibody, link.link_id()) else { continue };
             let (proxies, h) = (&around.scene.proxies, around.context.h);
             drive_constraints(&link.joint.data, &ends, proxies, h, &mut self.constraints);
             if !link.joint.data.motor_axes.is_empty() {
                 self.driven_links.push((index, link.link_id()));
             }
+        }
+        if !multibody.couplings().is_empty() {
+            let idle = around.scene.world_proxy();
+            let mut couplings = Vec::new();
+            coupling_constraints(multibody, |link| around.link_ends(multibody, link), idle, &mut couplings);
+            self.constraints.append(&mut couplings);
         }
     }
 }
@@ -153,6 +157,15 @@ impl WalkContext<'_> {
 
     fn collider_proxy(&mut self, collider: ColliderHandle) -> Option<ProxyId> {
         self.scene.collider_proxy(&self.context, collider)
+    }
+
+    /// Those of the multibody joint that leads to a link.
+    fn link_ends(&mut self, multibody: &Multibody, id: usize) -> Option<JointEnds> {
+        let link = multibody.link(id)?;
+        let parent = multibody.link(link.parent_id()?)?;
+        let handles = [parent.rigid_body_handle(), link.rigid_body_handle()];
+        let ends = self.ends(JointName::Multibody(handles[1]), handles)?;
+        Some(JointEnds { coordinates: own_coordinates(&link.joint), ..ends })
     }
 
     /// Two bodies as a joint sees them.

@@ -31,6 +31,8 @@ pub struct Material {
     pub elasticity: Elasticity,
     /// Least and largest stretch.
     pub strain_limits: Option<[f64; 2]>,
+    /// Least and largest stretch with which a step may end.
+    pub hard_strain_limits: Option<[f64; 2]>,
     /// Up to four terms of a Prony series, each `[ratio, time]`: stiffness over the lasting one, and seconds.
     #[serde(default)]
     pub maxwell_branches: Vec<[f64; 2]>,
@@ -101,8 +103,12 @@ impl Material {
             true => material,
             false => material.maxwell_branches([branch(0), branch(1), branch(2), branch(3)]),
         };
-        match self.strain_limits {
+        let material = match self.strain_limits {
             Some([least, largest]) => material.strain_limits(least, largest),
+            None => material,
+        };
+        match self.hard_strain_limits {
+            Some([least, largest]) => material.hard_strain_limits(least, largest),
             None => material,
         }
     }

@@ -100,6 +100,8 @@ fn rigid_part(robot: MjcfRobot, warnings: Vec<Warning>) -> RigidPart {
         links: links.collect(),
         joints: joints.collect(),
         gravity: Some(robot.gravity),
+        // Its couplings are taken up by the loader.
+        mimics: Vec::new(),
         warnings,
         loaded: Loaded::Mjcf(Box::new(robot)),
     }

@@ -1,6 +1,7 @@
 //! What may stand in a file of soft parts.
 
 use crate::error::{Place, RobotError};
+use foible3d::DeformableMaterial;
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::Path;
@@ -121,8 +122,38 @@ pub(super) struct Material {
 pub(super) enum Preset {
     #[serde(rename = "sylgard_184")]
     Sylgard184,
+    #[serde(rename = "ecoflex_00_30")]
+    Ecoflex0030,
+    #[serde(rename = "ecoflex_00_50")]
+    Ecoflex0050,
+    #[serde(rename = "dragon_skin_10")]
+    DragonSkin10,
+    #[serde(rename = "dragon_skin_20")]
+    DragonSkin20,
+    #[serde(rename = "dragon_skin_30")]
+    DragonSkin30,
+    #[serde(rename = "natural_rubber")]
+    NaturalRubber,
+    #[serde(rename = "texin_245")]
+    Texin245,
     #[serde(rename = "plastazote_ld33")]
     PlastazoteLd33,
+}
+
+impl Preset {
+    pub fn material(self) -> DeformableMaterial {
+        match self {
+            Self::Sylgard184 => DeformableMaterial::sylgard_184(),
+            Self::Ecoflex0030 => DeformableMaterial::ecoflex_00_30(),
+            Self::Ecoflex0050 => DeformableMaterial::ecoflex_00_50(),
+            Self::DragonSkin10 => DeformableMaterial::dragon_skin_10(),
+            Self::DragonSkin20 => DeformableMaterial::dragon_skin_20(),
+            Self::DragonSkin30 => DeformableMaterial::dragon_skin_30(),
+            Self::NaturalRubber => DeformableMaterial::natural_rubber(),
+            Self::Texin245 => DeformableMaterial::texin_245(),
+            Self::PlastazoteLd33 => DeformableMaterial::plastazote_ld33(),
+        }
+    }
 }
 
 /// Which vertices of the surface the link leads. In the link's frame.

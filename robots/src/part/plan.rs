@@ -1,6 +1,6 @@
 //! From the file of soft parts to bodies in their places.
 
-use super::file::{Lines, Material, Part, PartPose, Preset, read};
+use super::file::{Lines, Material, Part, PartPose, read};
 use super::shape::{Fault, mesh};
 use super::{PlannedPart, attach, surface_vertices};
 use crate::error::{Place, RobotError};
@@ -112,8 +112,7 @@ fn to_pose(pose: &PartPose) -> Result<Pose, Fault> {
 
 fn to_material(material: &Material) -> Result<DeformableMaterial, Fault> {
     let start = match (material.preset, material.shore_a, material.young) {
-        (Some(Preset::Sylgard184), None, None) => DeformableMaterial::sylgard_184(),
-        (Some(Preset::PlastazoteLd33), None, None) => DeformableMaterial::plastazote_ld33(),
+        (Some(preset), None, None) => preset.material(),
         (None, Some(hardness), None) => DeformableMaterial::shore_a(hardness),
         (None, None, Some(young)) => match material.poisson {
             Some(poisson) => DeformableMaterial::new(young, poisson),
