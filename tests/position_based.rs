@@ -220,6 +220,34 @@ fn a_filled_room_comes_to_the_pressure_of_its_gas() {
     assert!((own / truth - 1.0).abs() < 1e-3, "{own} {truth}");
 }
 
+#[test]
+fn forces_beyond_all_bounds_end_no_run() {
+    let bodies = [
+        DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2; 3]),
+        DeformableBodyBuilder::cuboid(Vector::splat(0.1), [2; 3]).smoothed(),
+        DeformableBodyBuilder::cloth([0.1, 0.1], [3, 3], 0.002),
+    ];
+    for (k, body) in bodies.into_iter().enumerate() {
+        for force in [1e12, 1e30, 3e38] {
+            let (mut physics, _) = common::world_with_floor(1.0 / 60.0);
+            let mut world = DeformableWorld::new();
+            let body = world.insert(body.clone().settings(xpbd(5)).translation(Vector::Y * 0.2)).unwrap();
+            let ball = RigidBodyBuilder::dynamic().translation(Vector::Y * 0.5);
+            let (ball, _) = physics.insert(ball, ColliderBuilder::ball(0.05));
+            for _ in 0..20 {
+                let _ = world.bodies[body].add_force(&[0], Vector::new(force, force, 0.0));
+                world.step(&mut physics);
+            }
+            let at = physics.bodies[ball].translation();
+            assert!(at.is_finite(), "{k}, {force}: {at}");
+            assert!(
+                !world.bodies[body].is_enabled()
+                    || positions(&world.bodies[body]).iter().flatten().all(|c| c.is_finite())
+            );
+        }
+    }
+}
+
 /// A body solved by sweeps on one solved by Projective Dynamics, on hills.
 fn stack() -> (PhysicsWorld, DeformableWorld, [DeformableBodyHandle; 2]) {
     let mut physics = PhysicsWorld::new();

@@ -145,6 +145,19 @@ impl PyRobot {
         self.world.get().with(py, set)?.map_err(refused)
     }
 
+    /// Names of the actuators of an MJCF file.
+    #[getter]
+    fn actuators(&self) -> Vec<String> {
+        self.robot.actuators().iter().map(|actuator| actuator.name.clone()).collect()
+    }
+
+    /// Sets the control of an actuator, within its range, until the next; returns what is set.
+    fn set_control(&self, py: Python<'_>, actuator: &str, control: f32) -> PyResult<f32> {
+        let set =
+            |inner: &mut crate::world::Inner| self.robot.set_control(&mut inner.physics, actuator, control);
+        self.world.get().with(py, set)?.map_err(refused)
+    }
+
     /// Where a joint is [m] or [rad].
     fn joint_position(&self, py: Python<'_>, joint: &str) -> PyResult<f32> {
         let inner = self.world.get().lock(py);

@@ -46,6 +46,21 @@ def test_a_hand_of_mjcf_has_its_soft_tips():
     assert np.isfinite(hand.joint_position("palm_lift"))
 
 
+def test_an_actuator_draws_its_joint(tmp_path):
+    file = tmp_path / "slide.xml"
+    file.write_text("""<mujoco><worldbody><body name="base"><geom type="box" size="0.02 0.02 0.02" mass="1"/>
+        <body name="table" pos="0 0 0.2"><joint name="lift" type="slide" axis="0 0 1"/><geom type="box" size="0.1 0.1 0.01" mass="1"/></body>
+        </body></worldbody><actuator><position name="lift" joint="lift" kp="500" kv="60" ctrlrange="-0.1 0.3"/></actuator></mujoco>""")
+    world = World(gravity=(0.0, 0.0, -9.81), dt=1.0 / 120.0)
+    robot = world.add_robot(file, fixed_base=True)
+    assert robot.actuators == ["lift"]
+    assert robot.set_control("lift", 0.9) == pytest.approx(0.3)
+    world.step(600)
+    assert robot.joint_position("lift") == pytest.approx(0.3 - 9.81 / 500, abs=2e-4)
+    with pytest.raises(f.DeformableBodyError, match="no actuator `drop`; there are lift"):
+        robot.set_control("drop", 0.0)
+
+
 def test_limits_clamp_and_wrong_names_are_told():
     world, robot = arm()
     assert robot.set_motor_position("lift", -99.0, 1.0e4, 1.0e3) > -99.0

@@ -221,7 +221,8 @@ fn put_in(
         handles.map(|(body, colliders)| RobotLink { name: link.name, body, colliders })
     });
     let links = links.collect();
-    Ok(Robot { links, joints, parts: put, hooks, gravity: rigid.gravity, warnings })
+    let actuators = rigid.actuators;
+    Ok(Robot { links, joints, actuators, parts: put, hooks, gravity: rigid.gravity, warnings })
 }
 
 fn name_joints(joints: &[RigidJoint], inserted: &Inserted, physics: &mut PhysicsWorld) -> Vec<RobotJoint> {

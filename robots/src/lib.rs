@@ -27,6 +27,7 @@ mod urdf;
 
 mod hooks;
 
+mod actuator;
 mod mimic;
 mod motor;
 mod passive;
@@ -37,6 +38,7 @@ mod saved;
 
 mod builder;
 
+pub use actuator::RobotActuator;
 pub use builder::{JointSolver, RobotBuilder};
 pub use error::{Place, RobotError, Warning};
 pub use hooks::RobotHooks;

@@ -140,7 +140,12 @@ impl Robot {
         if joint.passive.friction > 0.0 && data.motors[axis as usize].max_force == joint.passive.friction {
             data.set_motor_max_force(axis, joint.effort.unwrap_or(f32::MAX));
         }
-        passive::set_motor(data, axis, &joint.passive, &Drive { position, speed, stiffness, damping });
+        passive::set_motor(
+            data,
+            axis,
+            &joint.passive,
+            &Drive { position, speed, stiffness, damping, force: 0.0 },
+        );
         physics.wake_up(joint.child, true);
         Ok(())
     }

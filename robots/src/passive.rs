@@ -33,7 +33,12 @@ pub(crate) struct Drive {
     pub speed: f32,
     pub stiffness: f32,
     pub damping: f32,
+    /// Beside those, the same everywhere \[N\] or \[N m\].
+    pub force: f32,
 }
+
+/// Speed that is never reached [m/s] or [rad/s], for forces that do not ask for one.
+const NEVER: f32 = 1.0e3;
 
 /// Sets the motor of an axis to the sum of both.
 pub(crate) fn set_motor(joint: &mut GenericJoint, axis: JointAxis, own: &Passive, drive: &Drive) {
@@ -45,7 +50,19 @@ pub(crate) fn set_motor(joint: &mut GenericJoint, axis: JointAxis, own: &Passive
     let speed = mean(own.damping, 0.0, drive.damping, drive.speed);
     // Newtons and metres: the other model takes gains per mass.
     joint.set_motor_model(axis, MotorModel::ForceBased);
-    joint.set_motor(axis, position, speed, own.stiffness + drive.stiffness, own.damping + drive.damping);
+    let [stiffness, damping] = [own.stiffness + drive.stiffness, own.damping + drive.damping];
+    if drive.force == 0.0 {
+        joint.set_motor(axis, position, speed, stiffness, damping);
+    } else if stiffness > 0.0 {
+        joint.set_motor(axis, position + drive.force / stiffness, speed, stiffness, damping);
+    } else if damping > 0.0 {
+        joint.set_motor(axis, position, speed + drive.force / damping, stiffness, damping);
+    } else {
+        // A motor that asks for more than it may give gives all of that.
+        let greatest = joint.motors[axis as usize].max_force.min(drive.force.abs());
+        joint.set_motor_max_force(axis, greatest);
+        joint.set_motor(axis, position, NEVER.copysign(drive.force), 0.0, drive.force.abs());
+    }
 }
 
 /// Speed at which a motor that stands for dry friction yields all of it [m/s] or [rad/s]: a joint that is held creeps by less.

@@ -1,5 +1,6 @@
 //! Links and joints, as a loader has read them, and their way into rapier's sets.
 
+use crate::actuator::RobotActuator;
 use crate::builder::JointSolver;
 use crate::error::Warning;
 use crate::mimic::Mimic;
@@ -51,6 +52,7 @@ pub(crate) struct RigidPart {
     pub loaded: Loaded,
     /// The file's gravity, if it has one [m/s²].
     pub gravity: Option<Vector>,
+    pub actuators: Vec<RobotActuator>,
     /// Joints that follow others.
     pub mimics: Vec<Mimic>,
     pub warnings: Vec<Warning>,

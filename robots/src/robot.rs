@@ -1,5 +1,6 @@
 //! A robot in a world: its links, joints and soft parts by name.
 
+use crate::actuator::RobotActuator;
 use crate::error::{RobotError, Warning};
 use crate::hooks::RobotHooks;
 use crate::passive::Passive;
@@ -71,6 +72,7 @@ pub struct RobotPart {
 pub struct Robot {
     pub(crate) links: Vec<RobotLink>,
     pub(crate) joints: Vec<RobotJoint>,
+    pub(crate) actuators: Vec<RobotActuator>,
     pub(crate) parts: Vec<RobotPart>,
     pub(crate) hooks: RobotHooks,
     pub(crate) gravity: Option<Vector>,
@@ -144,7 +146,7 @@ impl Robot {
     }
 }
 
-fn find<'a, T>(
+pub(crate) fn find<'a, T>(
     kind: &'static str,
     name: &str,
     all: &'a [T],

@@ -1,5 +1,6 @@
 //! What is saved of a robot: names, handles and numbers; the bodies are saved with the worlds that they are in.
 
+use crate::actuator::RobotActuator;
 use crate::error::Warning;
 use crate::hooks::{Pairs, RobotHooks};
 use crate::passive::Passive;
@@ -12,6 +13,7 @@ use rapier3d::math::Vector;
 pub(crate) struct SavedRobot {
     links: Vec<RobotLink>,
     joints: Vec<RobotJoint>,
+    actuators: Vec<RobotActuator>,
     parts: Vec<RobotPart>,
     pairs: Pairs,
     gravity: Option<Vector>,
@@ -20,10 +22,10 @@ pub(crate) struct SavedRobot {
 
 impl From<Robot> for SavedRobot {
     fn from(robot: Robot) -> Self {
-        let Robot { links, joints, parts, hooks, gravity, warnings } = robot;
+        let Robot { links, joints, actuators, parts, hooks, gravity, warnings } = robot;
         let colliders: Vec<ColliderHandle> = links.iter().flat_map(|link| &link.colliders).copied().collect();
         let pairs = hooks.pairs(&colliders);
-        Self { links, joints, parts, pairs, gravity, warnings }
+        Self { links, joints, actuators, parts, pairs, gravity, warnings }
     }
 }
 
@@ -34,6 +36,10 @@ impl TryFrom<SavedRobot> for Robot {
         for joint in &saved.joints {
             check(joint).map_err(|what| format!("joint `{}` of a robot: {what}", joint.name))?;
         }
+        for actuator in &saved.actuators {
+            check_actuator(actuator)
+                .map_err(|what| format!("actuator `{}` of a robot: {what}", actuator.name))?;
+        }
         if saved.gravity.is_some_and(|gravity| !gravity.is_finite()) {
             return Err("gravity of a robot is not finite".into());
         }
@@ -41,8 +47,20 @@ impl TryFrom<SavedRobot> for Robot {
             return Err("the friction of a pair of a robot is not a number from 0 on".into());
         }
         let hooks = RobotHooks::of_pairs(&saved.pairs);
-        let SavedRobot { links, joints, parts, gravity, warnings, .. } = saved;
-        Ok(Self { links, joints, parts, hooks, gravity, warnings })
+        let SavedRobot { links, joints, actuators, parts, gravity, warnings, .. } = saved;
+        Ok(Self { links, joints, actuators, parts, hooks, gravity, warnings })
+    }
+}
+
+fn check_actuator(actuator: &RobotActuator) -> Result<(), &'static str> {
+    let law = &actuator.law;
+    if actuator.range.is_some_and(|[least, largest]| !(least <= largest)) {
+        return Err("its range is not in order");
+    }
+    let gains = [law.stiffness, law.damping, law.damping_by_control].into_iter().all(from_zero);
+    match gains && law.gain.is_finite() && law.constant.is_finite() && law.greatest >= 0.0 {
+        true => Ok(()),
+        false => Err("a number of its law is out of range"),
     }
 }
 

@@ -71,6 +71,7 @@ pub(crate) fn read(
         links: rigid_links,
         loaded: Loaded::Urdf(robot),
         gravity: None,
+        actuators: Vec::new(),
         mimics,
         warnings,
     })

@@ -56,6 +56,34 @@ fn a_finger_that_follows_presses_as_hard_as_the_one_that_is_driven() {
     assert!((at("left") - at("right")).abs() < 2.0e-5, "{} {}", at("left"), at("right"));
 }
 
+const JAWS: &str = r#"<mujoco><worldbody><body name="base"><geom type="box" size="0.05 0.05 0.01" mass="1"/>
+  <body name="left" pos="-0.06 0 0.06"><joint name="left" type="slide" axis="1 0 0"/><geom type="box" size="0.005 0.04 0.04" mass="0.1"/></body>
+  <body name="right" pos="0.06 0 0.06"><joint name="right" type="slide" axis="-1 0 0"/><geom type="box" size="0.005 0.04 0.04" mass="0.1"/></body>
+</body></worldbody><equality><joint joint1="right" joint2="left" polycoef="0 1 0 0 0"/></equality></mujoco>"#;
+
+#[test]
+fn jaws_of_an_equality_press_alike() {
+    let builder = RobotBuilder::mjcf_text(JAWS, ".").fixed_base(true);
+    let mut scene = Scene::new(builder, JointSolver::Multibody);
+    scene.physics.gravity = Vector::ZERO;
+    let material = DeformableMaterial::new(2.0e5, 0.3).mass_damping(5.0).friction(0.8);
+    let cube = DeformableBodyBuilder::cuboid(Vector::splat(0.03), [3; 3]).material(material);
+    let cube = scene.deformables.insert(cube.translation(Vector::Z * 0.06).can_sleep(false)).unwrap();
+    scene.robot.set_motor_position(&mut scene.physics, "left", 0.03, 1.0e3, 20.0).unwrap();
+    for _ in 0..360 {
+        scene.robot.step(&mut scene.physics, &mut scene.deformables);
+    }
+    let force = |link: &str| {
+        let shape = scene.robot.link(link).unwrap().colliders[0];
+        scene.deformables.contact_force(cube, shape).x.abs()
+    };
+    let [left, right] = ["left", "right"].map(force);
+    let motor = 1.0e3 * (0.03 - scene.robot.joint_position(&scene.physics, "left").unwrap());
+    println!("{left:.4} and {right:.4} N, motor {motor:.4} N");
+    assert!(motor > 2.0 && (left / right - 1.0).abs() < 0.01, "{left} {right} {motor}");
+    assert!(((left + right) / motor - 1.0).abs() < 0.02, "{left} {right} {motor}");
+}
+
 #[test]
 fn ratio_and_offset_are_kept_to() {
     let (mut scene, _) =

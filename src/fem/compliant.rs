@@ -101,6 +101,9 @@ impl ElementMultipliers {
             let sheet = membrane(&elements.materials[triangle.region as usize]);
             let ratio = damping.ratios.get(triangle.region as usize).copied().unwrap_or(0.0);
             let F = triangle.deformation_gradient(x);
+            if !F.iter().all(|c| c.is_finite()) {
+                continue;
+            }
             let mut stress = sheet.evaluate(&F).stress;
             if let Some(S) = damping.stretches.sheets.get(k) {
                 stress += sheet.change_response(&F, S).1 * ratio;
@@ -167,6 +170,9 @@ fn relax_solid(
     let first = x[nodes[0] as usize];
     let edges = nodes.iter().zip(gradients);
     let F = edges.fold(Mat3::zeros(), |F, (&n, g)| F + (x[n as usize] - first) * g.transpose());
+    if !F.iter().all(|c| c.is_finite()) {
+        return;
+    }
     let mut four = LaneMat3::default();
     (0..LANES).for_each(|i| four.set_lane(i, &F));
     let (material, lame) = (law.material, law.lame);

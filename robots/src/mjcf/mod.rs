@@ -7,6 +7,7 @@ mod pins;
 mod rotation;
 mod tree;
 
+use crate::actuator::{self, RobotActuator};
 use crate::builder::JointSolver;
 use crate::error::{RobotError, Warning};
 use crate::part::PlannedPart;
@@ -70,17 +71,19 @@ pub(crate) fn read(
         let carrier = if link == 0 { pose } else { *robot.bodies[link].body.position() };
         parts.push(flex_part::plan(flexcomp, (link > 0).then_some(link), carrier, &settings, &mut warnings)?);
     }
-    warn_of_drives(&model, &root, &mut warnings);
+    warn_of_others(&model, &root, &mut warnings);
+    let element = root.child("actuator").unwrap_or(root);
+    let actuators = actuator::read(&model.actuators, &element, &mut warnings);
     warn_of_lost_shapes(&robot, &model, &root, &mut warnings);
     if pose != Pose::IDENTITY && !robot.bodies[0].colliders.is_empty() {
         warnings
             .push(root.warning("shapes of the world stay where the file has them: the pose moves bodies"));
     }
-    Ok((rigid_part(robot, warnings), parts))
+    Ok((rigid_part(robot, actuators, warnings), parts))
 }
 
 /// Links and joints in the loader's order.
-fn rigid_part(robot: MjcfRobot, warnings: Vec<Warning>) -> RigidPart {
+fn rigid_part(robot: MjcfRobot, actuators: Vec<RobotActuator>, warnings: Vec<Warning>) -> RigidPart {
     let links = robot.bodies.iter().enumerate().map(|(number, body)| RigidLink {
         name: body.name.clone().unwrap_or_else(|| unnamed(number)),
         pose: *body.body.position(),
@@ -100,6 +103,7 @@ fn rigid_part(robot: MjcfRobot, warnings: Vec<Warning>) -> RigidPart {
         links: links.collect(),
         joints: joints.collect(),
         gravity: Some(robot.gravity),
+        actuators,
         // Its couplings are taken up by the loader.
         mimics: Vec::new(),
         warnings,
@@ -170,12 +174,8 @@ fn warn_of_lost_shapes(
 }
 
 /// Rapier's loader reads these, and leaves them to its user.
-fn warn_of_drives(model: &Model, root: &Element<'_, '_>, warnings: &mut Vec<Warning>) {
-    let read = [
-        ("actuator", model.actuators.len()),
-        ("sensor", model.sensors.len()),
-        ("keyframe", model.keyframes.len()),
-    ];
+fn warn_of_others(model: &Model, root: &Element<'_, '_>, warnings: &mut Vec<Warning>) {
+    let read = [("sensor", model.sensors.len()), ("keyframe", model.keyframes.len())];
     for (tag, count) in read {
         if count > 0 {
             let element = root.child(tag).unwrap_or(*root);
