@@ -37,8 +37,8 @@ pub(crate) struct Drive {
     pub force: f32,
 }
 
-/// Speed that is never reached [m/s] or [rad/s], for forces that do not ask for one.
-const NEVER: f32 = 1.0e3;
+/// How far away a spring ends that draws with a constant force \[m\] or \[rad\]: in a metre it changes by a ten-thousandth.
+pub(crate) const FAR: f32 = 1.0e4;
 
 /// Sets the motor of an axis to the sum of both.
 pub(crate) fn set_motor(joint: &mut GenericJoint, axis: JointAxis, own: &Passive, drive: &Drive) {
@@ -55,13 +55,9 @@ pub(crate) fn set_motor(joint: &mut GenericJoint, axis: JointAxis, own: &Passive
         joint.set_motor(axis, position, speed, stiffness, damping);
     } else if stiffness > 0.0 {
         joint.set_motor(axis, position + drive.force / stiffness, speed, stiffness, damping);
-    } else if damping > 0.0 {
-        joint.set_motor(axis, position, speed + drive.force / damping, stiffness, damping);
     } else {
-        // A motor that asks for more than it may give gives all of that.
-        let greatest = joint.motors[axis as usize].max_force.min(drive.force.abs());
-        joint.set_motor_max_force(axis, greatest);
-        joint.set_motor(axis, position, NEVER.copysign(drive.force), 0.0, drive.force.abs());
+        // Rapier keeps a motor's speed to what a limit of the joint leaves, not where it is drawn to.
+        joint.set_motor(axis, FAR.copysign(drive.force), speed, drive.force.abs() / FAR, damping);
     }
 }
 

@@ -58,7 +58,7 @@ fn check_actuator(actuator: &RobotActuator) -> Result<(), &'static str> {
         return Err("its range is not in order");
     }
     let gains = [law.stiffness, law.damping, law.damping_by_control].into_iter().all(from_zero);
-    match gains && law.gain.is_finite() && law.constant.is_finite() && law.greatest >= 0.0 {
+    match gains && law.gain.is_finite() && law.constant.is_finite() && law.forces[0] <= law.forces[1] {
         true => Ok(()),
         false => Err("a number of its law is out of range"),
     }

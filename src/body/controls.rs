@@ -30,6 +30,7 @@ impl DeformableBody {
         let others = self.model.regions().filter(|region| !has_own(region));
         others.into_iter().try_for_each(|region| self.check_warp(&material, region))?;
         self.material = material;
+        self.state.history.held = None;
         self.distribute_materials();
         Ok(())
     }
@@ -71,6 +72,7 @@ impl DeformableBody {
             Ok(place) => self.region_materials[place].1 = material,
             Err(place) => self.region_materials.insert(place, (region, material)),
         }
+        self.state.history.held = None;
         self.distribute_materials();
         Ok(())
     }

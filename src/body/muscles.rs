@@ -17,6 +17,7 @@ impl DeformableBody {
         check(stretch)?;
         self.wake_up();
         self.activation = stretch;
+        self.state.history.held = None;
         self.distribute_activations();
         Ok(())
     }
@@ -44,6 +45,7 @@ impl DeformableBody {
             Ok(place) => self.region_activations[place].1 = stretch,
             Err(place) => self.region_activations.insert(place, (region, stretch)),
         }
+        self.state.history.held = None;
         self.distribute_activations();
         Ok(())
     }

@@ -19,6 +19,7 @@ use crate::energy::membrane::polar_factor;
 use crate::energy::stencil::LengthEnergy;
 use crate::energy::{ElementEnergy, modes, with_energy};
 use crate::math::lanes::{LANES, Lane, LaneMat3};
+use crate::math::polar::polar_rotation;
 use crate::math::{Mat2, Mat3, Mat3x2, Vec3};
 use nalgebra::{Const, DimMin, SMatrix, SVector};
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -88,6 +89,31 @@ impl ElementMultipliers {
         energy
     }
 
+    /// Adds what they push the nodes with at positions `x` \[N\].
+    pub fn add_forces(&self, elements: &Elements<'_>, x: &[Vec3], force: &mut [Vec3]) {
+        let mut solids = self.solids.iter();
+        elements.model.for_each_energy(elements.materials, |_, element| {
+            let Some(S) = solids.next() else { return };
+            let frame = polar_rotation(&deformation_gradient(element, x));
+            let stress = SOLID_STRAINS.iter().zip(S.iter()).fold(Mat3::zeros(), |sum, (E, s)| sum + E * *s);
+            for (&n, g) in element.nodes.iter().zip(element.gradients) {
+                force[n as usize] -= frame * stress * g * element.volume;
+            }
+        });
+        for (triangle, S) in elements.model.triangles.iter().zip(&self.triangles) {
+            let frame = polar_factor(&triangle.deformation_gradient(x));
+            let stress = SHEET_STRAINS.iter().zip(S.iter()).fold(Mat2::zeros(), |sum, (E, s)| sum + E * *s);
+            for (&n, g) in triangle.nodes.iter().zip(&triangle.gradients) {
+                force[n as usize] -= frame * stress * g * triangle.volume;
+            }
+        }
+        for (stencil, S) in elements.model.stencils.iter().zip(&self.stencils) {
+            let own = length_energy(stencil, elements.materials, elements.activations);
+            let pull = length_direction(&own, &stencil.vector(x)).map_or(*S, |direction| direction * S.x);
+            stencil.terms().for_each(|(n, c)| force[n] -= pull * c);
+        }
+    }
+
     fn sweep_triangles(
         &mut self,
         elements: &Elements<'_>,
@@ -130,8 +156,6 @@ impl ElementMultipliers {
         for (k, (stencil, multiplier)) in model.stencils.iter().zip(&mut self.stencils).enumerate() {
             let own = length_energy(stencil, materials, activations);
             let b = stencil.vector(x);
-            let direction = b.normalize();
-            let is_length = own.length > 0.0 && direction.iter().all(|c| c.is_finite());
             let (mut pull, mut tangent) = (own.response(&b).1, own.tangent(&b));
             if let Some(&length) = damping.stretches.lengths.get(k) {
                 let [one, other] = stencil.regions.map(|region| damping.ratios[region as usize]);
@@ -141,7 +165,7 @@ impl ElementMultipliers {
                 tangent += damper.tangent(&b);
             }
             let moved: f64 = stencil.terms().map(|(n, c)| c * c * w[n]).sum();
-            let push = if is_length {
+            let push = if let Some(direction) = length_direction(&own, &b) {
                 let along = (tangent * direction).dot(&direction).max(0.0);
                 let change = (pull.dot(&direction) - multiplier.x) / (1.0 + along * moved);
                 multiplier.x += change;
@@ -166,10 +190,7 @@ fn relax_solid(
     multiplier: &mut SVector<f64, 6>,
 ) {
     let SolidElement { nodes, gradients, volume, place: [block, lane] } = *element;
-    // Against one of the nodes: far from the origin, sums of gradients that cancel would not.
-    let first = x[nodes[0] as usize];
-    let edges = nodes.iter().zip(gradients);
-    let F = edges.fold(Mat3::zeros(), |F, (&n, g)| F + (x[n as usize] - first) * g.transpose());
+    let F = deformation_gradient(element, x);
     if !F.iter().all(|c| c.is_finite()) {
         return;
     }
@@ -212,6 +233,19 @@ fn stiffness<const C: usize, const M: usize, const N: usize>(
 fn inverse<const M: usize>(H: &SMatrix<f64, M, M>) -> SMatrix<f64, M, M> {
     let shifted = H + SMatrix::<f64, M, M>::identity() * (SOFTEST * H.trace());
     shifted.cholesky().map_or(SMatrix::zeros(), |factor| factor.inverse())
+}
+
+/// Along the vector of a stencil that keeps a length; none of one that wants to vanish, or that has no direction.
+fn length_direction(own: &LengthEnergy, b: &Vec3) -> Option<Vec3> {
+    let direction = b.normalize();
+    (own.length > 0.0 && direction.iter().all(|c| c.is_finite())).then_some(direction)
+}
+
+fn deformation_gradient(element: &SolidElement<'_>, x: &[Vec3]) -> Mat3 {
+    // Against one of the nodes: far from the origin, sums of gradients that cancel would not.
+    let first = x[element.nodes[0] as usize];
+    let edges = element.nodes.iter().zip(element.gradients);
+    edges.fold(Mat3::zeros(), |F, (&n, g)| F + (x[n as usize] - first) * g.transpose())
 }
 
 /// `K = Σ w g gᵀ`.

@@ -211,7 +211,7 @@ impl Island {
                 // of the scale the body stays where it is: its step would have been a thousandth.
                 if !acceleration.is_empty() {
                     acceleration.clear();
-                } else if body.step_damping < MAX_STEP_DAMPING * body.scale {
+                } else if body.step_damping < MAX_STEP_DAMPING * body.scale && !body.is_xpbd() {
                     body.step_damping *= 2.0;
                     damped_more = true;
                 } else {

@@ -10,6 +10,7 @@ mod tree;
 use crate::actuator::{self, RobotActuator};
 use crate::builder::JointSolver;
 use crate::error::{RobotError, Warning};
+use crate::motor::single_axis;
 use crate::part::PlannedPart;
 use crate::passive::Passive;
 use crate::rigid::{Loaded, RigidJoint, RigidLink, RigidPart, shapes_of};
@@ -72,8 +73,11 @@ pub(crate) fn read(
         parts.push(flex_part::plan(flexcomp, (link > 0).then_some(link), carrier, &settings, &mut warnings)?);
     }
     warn_of_others(&model, &root, &mut warnings);
-    let element = root.child("actuator").unwrap_or(root);
-    let actuators = actuator::read(&model.actuators, &element, &mut warnings);
+    let is_single = |name: &str| {
+        let joint = robot.joints.iter().find(|joint| joint.name.as_deref() == Some(name));
+        joint.is_some_and(|joint| single_axis(&joint.joint).is_some())
+    };
+    let actuators = actuator::read(&model, &root, is_single, &mut warnings);
     warn_of_lost_shapes(&robot, &model, &root, &mut warnings);
     if pose != Pose::IDENTITY && !robot.bodies[0].colliders.is_empty() {
         warnings

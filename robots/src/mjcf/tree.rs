@@ -10,7 +10,14 @@ use std::path::PathBuf;
 /// Deepest way of files that include files.
 const DEEPEST: usize = 16;
 /// Attributes that are numbers wherever they stand in the elements that the loader reads.
-const NUMBERS: [&str; 31] = [
+const NUMBERS: [&str; 38] = [
+    "ctrlrange",
+    "forcerange",
+    "gear",
+    "kp",
+    "kv",
+    "gainprm",
+    "biasprm",
     "pos",
     "quat",
     "axisangle",

@@ -96,11 +96,13 @@ impl BodyProblem {
         let start = self.start_energy();
         let (x, _) = self.origin();
         let mut work = 0.0;
+        let multiplied = self.multiplier_residuals();
+        let residuals = multiplied.as_ref().unwrap_or(&self.current.r);
         let mut pins = self.key.pins.iter().peekable();
         for (i, m) in self.masses.iter().enumerate() {
             let moved = self.current.x[i] - x[i];
             work += if pins.next_if(|&&p| p as usize == i).is_some() {
-                let force = if self.is_alpha() { self.alpha_pin_force(i) } else { -self.current.r[i] };
+                let force = if self.is_alpha() { self.alpha_pin_force(i) } else { -residuals[i] };
                 (force - self.limit_force(i)).dot(&moved)
             } else {
                 (self.fall[i] * *m + self.contact_force[i]).dot(&moved)

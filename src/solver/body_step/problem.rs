@@ -353,11 +353,12 @@ impl BodyProblem {
 
     /// Makes the trial the current iterate: no step.
     pub fn reject_trial(&mut self) {
+        self.reject_multipliers();
         self.trial.clone_from(&self.current);
     }
 
     pub fn accept_trial(&mut self) {
-        self.feel_contacts();
+        self.accept_multipliers();
         std::mem::swap(&mut self.current, &mut self.trial);
     }
 

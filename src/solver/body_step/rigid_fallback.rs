@@ -32,12 +32,14 @@ impl BodyProblem {
         let mut ends = std::mem::take(&mut self.force);
         self.unlimited_velocities(false, &mut ends);
         let (mut kinetic, mut gained, mut by_contact) = (0.0, self.elastic_energy() - before, 0.0);
+        let multiplied = self.multiplier_residuals();
+        let residuals = multiplied.as_ref().unwrap_or(&self.current.r);
         let mut pins = self.key.pins.iter().peekable();
         for (i, m) in self.masses.iter().enumerate() {
             let moved = self.current.x[i] - self.x_start[i];
             if pins.next_if(|&&p| p as usize == i).is_some() {
                 // The force of the pin.
-                gained += self.current.r[i].dot(&moved);
+                gained += residuals[i].dot(&moved);
                 continue;
             }
             let v = self.v_start[i];
