@@ -139,12 +139,17 @@ def test_a_child_by_fork_steps_on():
 
 def test_control_c_is_heard():
     world = f.World()
-    for step in (world.step, lambda n: f.step_all([world], n)):
-        timer = threading.Timer(0.2, lambda: signal.raise_signal(signal.SIGINT))
-        timer.start()
-        with pytest.raises(KeyboardInterrupt):
-            step(10**12)
-        timer.join()
+    # What is started in the background of a shell has it ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        for step in (world.step, lambda n: f.step_all([world], n)):
+            timer = threading.Timer(0.2, lambda: signal.raise_signal(signal.SIGINT))
+            timer.start()
+            with pytest.raises(KeyboardInterrupt):
+                step(10**12)
+            timer.join()
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_a_world_is_used_from_several_threads():
