@@ -85,7 +85,11 @@ impl SoftDetector {
         if surfaces.iter().all(|s| s.model.surface.is_closed()) {
             match itself {
                 true => untangle_itself(a, &self.pairs, first, constraints),
-                false => untangle(surfaces, &self.pairs, constraints),
+                false => {
+                    let is_kept_apart = |kind: SoftPairKind| kind != SoftPairKind::Separation;
+                    let has_contacts = self.carried.iter().any(|((_, _, kind), _)| is_kept_apart(*kind));
+                    untangle(surfaces, &self.pairs, !has_contacts, constraints);
+                }
             }
         }
     }

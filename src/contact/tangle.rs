@@ -9,37 +9,86 @@ use crate::math::{Vec3, to_real};
 use crate::mesh::tetrahedron_holds;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Pose;
-use parry3d::query::{PointQuery, intersection_test};
+use parry3d::query::{PointQuery, distance as distance_between, intersection_test};
 use parry3d::shape::Triangle;
 
-/// Depth, in mean edges, of a node in the other body from which on the two are tangled.
+/// Depth of a node in the other body from which on the two are tangled, in mean edges or in half thicknesses of the other, whichever is
+/// less: in a strip of two cells nothing is half a cell's length deep.
 const DEEP: f64 = 0.5;
+/// Pairs of touching triangles that two bodies are drawn apart by, at the most: hundreds end unsolved.
+const HANDLES: usize = 24;
 /// Height, in mean edges, from which on a corner is on one side of a plane, and not in it.
 const CLEARLY: f64 = 0.1;
 
 /// Appends constraints that draw apart what is tangled, as fast as overlaps are recovered, on triangles that go through one
-/// another; `pairs` are triangles whose boxes meet.
+/// another; `pairs` are triangles whose boxes meet. Where faces of the two lie in the same planes none go through, as of boxes that were
+/// put into one another along an axis: of bodies that have no other contacts, which `looks_at_touching` says, triangles that touch serve
+/// too.
 pub(super) fn untangle(
-    [a, b]: [&SoftSurface<'_>; 2],
+    surfaces: [&SoftSurface<'_>; 2],
     pairs: &[(u32, u32)],
+    looks_at_touching: bool,
     constraints: &mut Vec<Constraint>,
 ) {
+    let [a, b] = surfaces;
     let first = constraints.len();
-    let middle = |s: &SoftSurface<'_>| s.x.iter().sum::<Vec3>() / s.x.len() as f64;
     let is_same_place = is_same_place(a, b);
     // Bodies in the very same place part in any direction.
-    let mut apart = is_same_place.then_some(Some(Vec3::y()));
-    for (ta, tb) in
-        pairs.iter().copied().filter(|&(ta, tb)| is_same_place && ta == tb || go_through(a, ta, b, tb))
-    {
-        let apart = *apart.get_or_insert_with(|| {
-            let is_deep = is_deep(a, b) || is_deep(b, a);
-            is_deep.then(|| (middle(a) - middle(b)).try_normalize(0.0).unwrap_or_else(Vec3::y))
-        });
-        let Some(apart) = apart else { return };
+    let mut apart = is_same_place.then(Vec3::y);
+    for &(ta, tb) in pairs {
+        if !(is_same_place && ta == tb || go_through(a, ta, b, tb)) {
+            continue;
+        }
+        if apart.is_none() && !are_deep(surfaces) {
+            return;
+        }
+        let apart = *apart.get_or_insert_with(|| way_apart(surfaces));
         constraints.push(constraint(a, ta, b, tb, apart));
     }
+    if looks_at_touching && constraints.len() == first && !pairs.is_empty() && are_deep(surfaces) {
+        let apart = way_apart(surfaces);
+        let touching = touching_pairs(surfaces, pairs);
+        constraints.extend(touching.iter().map(|&(ta, tb)| constraint(a, ta, b, tb, apart)));
+    }
     constraints[first..].sort_unstable_by_key(|constraint| constraint.key);
+}
+
+/// The direction in which the first of two bodies leaves the other: away from its middle, or where the two are the same the axis along
+/// which their boxes overlap least.
+fn way_apart([a, b]: [&SoftSurface<'_>; 2]) -> Vec3 {
+    let middle = |s: &SoftSurface<'_>| s.x.iter().sum::<Vec3>() / s.x.len() as f64;
+    let clearly = CLEARLY * a.model.surface.mean_edge.min(b.model.surface.mean_edge);
+    let away = middle(a) - middle(b);
+    if away.norm() > clearly {
+        return away.normalize();
+    }
+    let corners = |s: &SoftSurface<'_>| {
+        (s.x.iter().fold(s.x[0], |p, q| p.inf(q)), s.x.iter().fold(s.x[0], |p, q| p.sup(q)))
+    };
+    let ((low_a, high_a), (low_b, high_b)) = (corners(a), corners(b));
+    let overlap = high_a.inf(&high_b) - low_a.sup(&low_b);
+    Vec3::ith_axis(overlap.imin()).into_inner()
+}
+
+/// Some pairs of triangles that touch, no triangle twice, from all over where they do.
+fn touching_pairs([a, b]: [&SoftSurface<'_>; 2], pairs: &[(u32, u32)]) -> Vec<(u32, u32)> {
+    let mut touching: Vec<_> = pairs.iter().copied().filter(|&(ta, tb)| touch(a, ta, b, tb)).collect();
+    touching.sort_unstable();
+    let mut taken = vec![false; b.model.surface.triangles.len()];
+    touching.dedup_by(|pair, last| {
+        // A triangle of the second that is taken is none for another.
+        pair.0 == last.0 || std::mem::replace(&mut taken[pair.1 as usize], true)
+    });
+    let every = touching.len().div_ceil(HANDLES).max(1);
+    touching.into_iter().step_by(every).collect()
+}
+
+/// Whether two triangles are as good as on one another.
+fn touch(a: &SoftSurface<'_>, ta: u32, b: &SoftSurface<'_>, tb: u32) -> bool {
+    let clearly = CLEARLY * a.model.surface.mean_edge.min(b.model.surface.mean_edge);
+    let [p, q] = [corners(a, ta), corners(b, tb)]
+        .map(|[a, b, c]| Triangle::new(to_real(&a), to_real(&b), to_real(&c)));
+    distance_between(&Pose::IDENTITY, &p, &Pose::IDENTITY, &q).is_ok_and(|d| f64::from(d.distance) < clearly)
 }
 
 /// Whether two bodies of one mesh are node on node: their triangles touch all over, and none goes through another.
@@ -128,7 +177,7 @@ impl Part {
             around.iter().any(|tet| tetrahedron_holds(tet, &p))
                 && (0..surface.triangles.len() as u32)
                     .filter(|&t| !surface.triangles[t as usize].iter().any(|&n| self.holds(n)))
-                    .all(|t| distance(own, t, &p) > DEEP * surface.mean_edge)
+                    .all(|t| distance(own, t, &p) > deep(own))
         })
     }
 }
@@ -169,9 +218,18 @@ fn go_through(a: &SoftSurface<'_>, ta: u32, b: &SoftSurface<'_>, tb: u32) -> boo
     intersection_test(&Pose::IDENTITY, &p, &Pose::IDENTITY, &q).is_ok_and(|found| found.intersecting)
 }
 
+/// Depth from which on a node is deep in a body \[m\].
+fn deep(s: &SoftSurface<'_>) -> f64 {
+    DEEP * s.model.surface.mean_edge.min(s.model.surface.half_thickness)
+}
+
+fn are_deep([a, b]: [&SoftSurface<'_>; 2]) -> bool {
+    is_deep(a, b) || is_deep(b, a)
+}
+
 /// Whether a surface node of one body is deep in the other.
 fn is_deep(own: &SoftSurface<'_>, other: &SoftSurface<'_>) -> bool {
-    let depth = DEEP * other.model.surface.mean_edge;
+    let depth = deep(other);
     // What is that deep is as far inside of the other's box: next to nothing of bodies that rest on one another.
     let low = other.x.iter().fold(other.x[0], |a, b| a.inf(b)).add_scalar(depth);
     let high = other.x.iter().fold(other.x[0], |a, b| a.sup(b)).add_scalar(-depth);

@@ -34,6 +34,8 @@ pub(crate) struct Surface {
     pub index_of_node: Vec<u32>,
     /// Mean length of the edges at rest \[m\].
     pub mean_edge: f64,
+    /// Volume over area of what is solid, at rest \[m\]: half the thickness of a wide plate; zero without solids.
+    pub half_thickness: f64,
 }
 
 impl Surface {
@@ -82,11 +84,24 @@ impl Surface {
             segments,
             index_of_node,
             mean_edge: 0.0,
+            half_thickness: 0.0,
         };
         surface.describe_nodes();
         let length = |e: &[u32; 2]| (rest[e[0] as usize] - rest[e[1] as usize]).norm();
         surface.mean_edge = surface.edges.iter().map(length).sum::<f64>() / surface.edges.len().max(1) as f64;
+        surface.half_thickness = surface.volume_over_area(rest);
         surface
+    }
+
+    fn volume_over_area(&self, rest: &[Vec3]) -> f64 {
+        let (mut volume, mut area) = (0.0, 0.0);
+        for triangle in &self.triangles[..self.closed] {
+            let [a, b, c] = triangle.map(|n| rest[n as usize]);
+            let normal = (b - a).cross(&(c - a));
+            volume += normal.dot(&(a - rest[self.triangles[0][0] as usize])) / 6.0;
+            area += 0.5 * normal.norm();
+        }
+        if area > 0.0 { volume / area } else { 0.0 }
     }
 
     /// Whether a node is there, and on the surface.

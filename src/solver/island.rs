@@ -61,8 +61,6 @@ const ROUNDS: usize = 4;
 const BEFORE_SOLVE: Slack = Slack { edges: 0.01, motions: 0.05 };
 /// The same after a solve: what overlaps, and of what moves what nearly does.
 const AFTER_SOLVE: Slack = Slack { edges: -1.0e-5, motions: 0.05 };
-/// Residual over forces, and error of contact forces, beyond which a step goes on and is looked at again.
-pub(super) const FAR_FROM_SOLVED: f64 = 0.1;
 /// Largest factor on A that the guard tries.
 const MAX_STEP_DAMPING: f64 = 1024.0;
 
@@ -103,8 +101,7 @@ impl Island {
                 Outcome::Stalled => true,
                 Outcome::Turned => false,
                 Outcome::Descended => {
-                    self.contacts.is_done(FAR_FROM_SOLVED)
-                        && self.bodies.iter().all(BodyProblem::has_converged)
+                    self.contacts.is_done() && self.bodies.iter().all(BodyProblem::has_converged)
                 }
             };
             if done {

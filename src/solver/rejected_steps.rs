@@ -1,8 +1,8 @@
 //! Steps of an island that would make energy: their bodies keep their shape and move as rigid ones.
 
 use super::body_step::Factors;
-use super::constraints::{Change, SolveContext};
-use super::island::{FAR_FROM_SOLVED, Island};
+use super::constraints::{Change, FAR_FROM_SOLVED, SolveContext};
+use super::island::Island;
 
 /// Contact problems of rejected steps, at the most, until contacts turn them no more.
 const FALLBACK_ROUNDS: usize = 4;
@@ -32,8 +32,8 @@ impl Island {
 
     pub(super) fn would_be_rejected(&mut self, index: usize, context: &SolveContext<'_>) -> bool {
         let body = &self.bodies[index];
-        let is_solved = self.contacts.work.error <= FAR_FROM_SOLVED
-            && body.residual() <= FAR_FROM_SOLVED * body.force_scale();
+        let is_solved =
+            !self.contacts.is_far_from_solved() && body.residual() <= FAR_FROM_SOLVED * body.force_scale();
         !is_solved && self.would_gain_energy(index, 0.0, context)
     }
 

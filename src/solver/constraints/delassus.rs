@@ -7,10 +7,10 @@ use super::lists::{ActiveContact, MatrixPlace};
 use super::rigid_proxy::{RigidProxies, RigidProxy};
 use crate::body::ConstraintGeometry;
 use crate::contact::{Constraint, Endpoint, PathPoint};
-use crate::math::Mat3;
 use crate::solver::body_step::{BodyProblem, Factors};
 use crate::solver::linear::BlockMatrix;
 use std::cell::RefCell;
+use std::ops::Range;
 
 /// What the last W was made of, and memory for making the next.
 #[derive(Default)]
@@ -35,7 +35,22 @@ pub(crate) struct ContactRows<'a> {
 
 thread_local! {
     /// Memory of each thread that makes blocks.
-    static MOVED: RefCell<[NodeMotions; 2]> = RefCell::default();
+    static MEMORY: RefCell<BlockMemory> = RefCell::default();
+}
+
+/// Memory for making a block.
+#[derive(Default)]
+struct BlockMemory {
+    moved: [NodeMotions; 2],
+    runs: Vec<Run>,
+}
+
+/// Contacts of a group that stood next to one another in the W before, in the same order.
+struct Run {
+    contacts: Range<usize>,
+    /// Their rows within the group now, and the first of them then.
+    rows: Range<usize>,
+    first_before: usize,
 }
 
 /// Rounding of rapier's positions, relative to them: a few units of `f32`.
@@ -91,7 +106,7 @@ impl Delassus {
             let making =
                 Making { of: self, contacts, groups, operands: Operands { bodies, factors, proxies } };
             W.for_each_block(|k, values| {
-                MOVED.with_borrow_mut(|moved| making.fill(groups.coupled[k], moved, values));
+                MEMORY.with_borrow_mut(|memory| making.fill(groups.coupled[k], memory, values));
             });
         }
         for group in 0..groups.starts.len() - 1 {
@@ -128,25 +143,34 @@ struct Making<'a> {
 
 impl Making<'_> {
     /// Fills the block of two groups.
-    fn fill(&self, (gi, gj): (usize, usize), moved: &mut [NodeMotions; 2], values: &mut [f64]) {
+    fn fill(&self, (gi, gj): (usize, usize), memory: &mut BlockMemory, values: &mut [f64]) {
+        let BlockMemory { moved, runs } = memory;
         let starts = &self.groups.starts;
         let (rows, columns) =
             (&self.contacts[starts[gi]..starts[gi + 1]], &self.contacts[starts[gj]..starts[gj + 1]]);
         let m = self.of.starts[gi + 1] - self.of.starts[gi];
         let before = self.block_before(rows, columns);
+        runs.clear();
+        if before.is_some() {
+            list_runs(rows, self.of.starts[gi], runs);
+        }
         for (j, at) in columns.iter().enumerate() {
-            // The diagonal's blocks are symmetric.
-            let from = if gi == gj { j } else { 0 };
             let column = at.first - self.of.starts[gj];
+            let width = at.constraint.dimension();
+            let own = (gi == gj).then_some(j);
+            if let Some(before) = &before {
+                before.copy(at, own, runs, &mut values[column * m..(column + width) * m]);
+            }
             moved.iter_mut().for_each(NodeMotions::begin);
-            for (i, on) in rows.iter().enumerate().skip(from) {
+            // The diagonal's blocks are symmetric.
+            for (i, on) in rows.iter().enumerate().skip(own.unwrap_or(0)) {
+                if before.as_ref().is_some_and(|before| before.has(on, at, gi == gj)) {
+                    continue;
+                }
                 let row = on.first - self.of.starts[gi];
-                let block =
-                    before.as_ref().and_then(|before| before.take(on, at, gi == gj)).unwrap_or_else(|| {
-                        let jacobian = &self.of.jacobian;
-                        self.operands.block(&jacobian[starts[gi] + i], &jacobian[starts[gj] + j], moved)
-                    });
-                for c in 0..at.constraint.dimension() {
+                let jacobian = &self.of.jacobian;
+                let block = self.operands.block(&jacobian[starts[gi] + i], &jacobian[starts[gj] + j], moved);
+                for c in 0..width {
                     for r in 0..on.constraint.dimension() {
                         values[(column + c) * m + row + r] = block[(r, c)];
                         if gi == gj {
@@ -188,20 +212,52 @@ struct BlockBefore<'a> {
 }
 
 impl BlockBefore<'_> {
-    /// What it has for two contacts, if it was made the same way round.
-    fn take(&self, on: &ActiveContact, at: &ActiveContact, is_diagonal: bool) -> Option<Mat3> {
-        let (on, at, [m, n]) = (on.in_matrix?, at.in_matrix?, [on, at].map(|c| c.constraint.dimension()));
+    /// Whether it has what two contacts have to do with one another, made the same way round.
+    fn has(&self, on: &ActiveContact, at: &ActiveContact, is_diagonal: bool) -> bool {
+        let (Some(on), Some(at)) = (on.in_matrix, at.in_matrix) else { return false };
         // The diagonal has the constraints' own compliance too.
-        if is_diagonal && on.row <= at.row {
-            return None;
-        }
-        let mut block = Mat3::zeros();
-        for c in 0..n {
-            for r in 0..m {
-                block[(r, c)] = self.values[(at.row + c) * self.rows + on.row + r];
+        !is_diagonal || on.row > at.row
+    }
+
+    /// Copies what it has of the columns of a contact; `own` is its place among the rows of a block on the diagonal, of
+    /// which the upper triangle is copied too.
+    fn copy(&self, at: &ActiveContact, own: Option<usize>, runs: &[Run], columns: &mut [f64]) {
+        let (Some(at_before), width) = (at.in_matrix, at.constraint.dimension()) else { return };
+        let m = columns.len() / width;
+        for Run { contacts, rows, first_before } in runs {
+            let mut copy = |rows: Range<usize>, first_before: usize| {
+                for c in 0..width {
+                    let from = (at_before.row + c) * self.rows + first_before;
+                    columns[c * m + rows.start..c * m + rows.end]
+                        .copy_from_slice(&self.values[from..from + rows.len()]);
+                }
+            };
+            match own {
+                Some(j) if contacts.contains(&j) => {
+                    let above = at_before.row - first_before;
+                    copy(rows.start..rows.start + above, *first_before);
+                    copy(rows.start + above + width..rows.end, at_before.row + width);
+                }
+                // Another order than then: it is made anew.
+                Some(j) if (j < contacts.start) != (at_before.row < *first_before) => {}
+                _ => copy(rows.clone(), *first_before),
             }
         }
-        Some(block)
+    }
+}
+
+/// Lists what stands in a group, whose first row is `first`, as it stood in the W before.
+fn list_runs(group: &[ActiveContact], first: usize, runs: &mut Vec<Run>) {
+    for (i, contact) in group.iter().enumerate() {
+        let Some(before) = contact.in_matrix else { continue };
+        let (row, height) = (contact.first - first, contact.constraint.dimension());
+        match runs.last_mut() {
+            Some(run) if run.contacts.end == i && run.first_before + run.rows.len() == before.row => {
+                run.contacts.end = i + 1;
+                run.rows.end = row + height;
+            }
+            _ => runs.push(Run { contacts: i..i + 1, rows: row..row + height, first_before: before.row }),
+        }
     }
 }
 

@@ -46,17 +46,13 @@ impl ContactGroups {
         self.are_holds.extend(self.ends.iter().map(|ends| ends.are_holds));
         self.holds = self.are_holds.iter().filter(|are_holds| **are_holds).count();
         self.elimination.arrange(&self.sizes, &self.are_holds);
-        let (group_of_constraint, rank) = (&self.group_of_constraint, &self.elimination.rank);
-        let sorted = group_of_constraint.windows(2).all(|w| rank[w[0]] <= rank[w[1]]);
-        if !sorted {
-            let known = &self.known;
-            let rank_of = |constraint: &Constraint| {
-                let ends = ends_of(constraint, proxies, condenses);
-                let found = known.binary_search_by_key(&ends, |(ends, _)| *ends);
-                found.map_or(usize::MAX, |at| rank[known[at].1])
-            };
-            let order = |a: &Constraint, b: &Constraint| rank_of(a).cmp(&rank_of(b)).then(a.key.cmp(&b.key));
-            contacts.sort_unstable_by(|a, b| order(&a.constraint, &b.constraint));
+        for (contact, group) in contacts.iter_mut().zip(&self.group_of_constraint) {
+            contact.rank = self.elimination.rank[*group];
+        }
+        if !contacts.is_sorted_by_key(|contact| contact.rank) {
+            contacts.sort_unstable_by(|a, b| {
+                a.rank.cmp(&b.rank).then_with(|| a.constraint.key.cmp(&b.constraint.key))
+            });
         }
         let groups = self.sizes.len();
         self.starts.clear();

@@ -39,6 +39,10 @@ const MAKING: [usize; 2] = [10, 40];
 /// Operations of a product per body and per contact, besides four for every number of a factor, about.
 const PER_BODY: usize = 3000;
 const PER_CONTACT: usize = 2000;
+/// Operations of the coarse problem before it, for every pair of bodies in the island, about: the factor of what twelve unknowns a body
+/// have to do with one another fills in. Without it, a heap of 200 cubes that land had products, which end an impact with errors of 1 and
+/// a hundred rejected bodies a step, in place of sweeps, which end it with 1e-2 and none, in two thirds of the time.
+const PER_PAIR: usize = 4000;
 /// Newton's method is tried from the forces as they are where a factorization takes no more than so many iterations.
 const WARM_WORK: usize = 120;
 /// Tries of that in a step that may fail.
@@ -126,7 +130,7 @@ impl ContactSystem {
     }
 
     /// Whether something rigid that yields might take part: sweeps carry a load through light things slowly.
-    fn has_loads(&self, context: &SolveContext<'_>) -> bool {
+    pub(super) fn has_loads(&self, context: &SolveContext<'_>) -> bool {
         let yields = |endpoint: &Endpoint| endpoint.proxy().is_some_and(|p| context.proxies.yields(p));
         self.constraints().any(|constraint| constraint.all_endpoints().any(yields))
     }
@@ -138,7 +142,9 @@ impl ContactSystem {
         let making = MAKING[usize::from(!has_one_frame)] * self.groups.product_work();
         let numbers: usize =
             bodies.iter().enumerate().map(|(i, b)| factors.of(i, b).symbolic.factor_len()).sum();
-        let product = 4 * numbers + PER_BODY * bodies.len() + PER_CONTACT * self.active.len();
+        let own = PER_BODY * bodies.len() + PER_CONTACT * self.active.len();
+        let pairs = bodies.len() * (bodies.len() - 1) / 2;
+        let product = 4 * numbers + own + PER_PAIR * pairs;
         making > if is_loose { LOOSE_PRODUCTS } else { PRODUCTS[1] } * product
     }
 

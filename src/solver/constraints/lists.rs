@@ -12,6 +12,8 @@ pub(crate) struct ActiveContact {
     pub geometry: ConstraintGeometry,
     /// Its first row in the problem: place of its normal force in everything that is packed by rows.
     pub first: usize,
+    /// Of its group in the order of the groups.
+    pub rank: usize,
     /// De Saxcé shift \[m\].
     pub shift: f64,
     /// Where the W that was made last has it. Within a step, in which rigid bodies and h stay as they are: contacts
@@ -46,7 +48,8 @@ pub(crate) struct ContactResult<'a> {
 impl ActiveContact {
     /// That of a constraint; where it acts, its row and its shift are set when the problem is packed.
     pub fn new(constraint: Constraint) -> Self {
-        Self { constraint, geometry: ConstraintGeometry::default(), first: 0, shift: 0.0, in_matrix: None }
+        let geometry = ConstraintGeometry::default();
+        Self { constraint, geometry, first: 0, rank: 0, shift: 0.0, in_matrix: None }
     }
 
     /// Its rows in the problem.

@@ -12,7 +12,7 @@ use super::groups::ContactGroups;
 use super::lists::{ActiveContact, Candidate, ContactResult};
 use super::matrix_free::Response;
 use super::rigid_proxy::{Reaction, RigidProxies};
-use crate::body::ConstraintMemory;
+use crate::body::{ConstraintKey, ConstraintMemory};
 use crate::contact::{Constraint, Endpoint, Law};
 use crate::math::Vec3;
 use crate::solver::body_step::BodyProblem;
@@ -108,6 +108,8 @@ pub(crate) struct ContactWork {
     pub error: f64,
 }
 
+/// Residual over forces, and error of contact forces, beyond which a step goes on and is looked at again.
+pub(crate) const FAR_FROM_SOLVED: f64 = 0.1;
 /// Compliance [m/N] of contacts of a body that keeps its shape with itself: any positive number.
 const WITHIN_A_SHAPE: f64 = 1.0e-6;
 
@@ -137,9 +139,14 @@ impl ContactSystem {
         self.spent = Spent::default();
     }
 
+    pub fn is_far_from_solved(&self) -> bool {
+        // Written so that NaN counts as far.
+        !(self.work.error <= FAR_FROM_SOLVED)
+    }
+
     /// Whether the contacts are not far from solved, or what they may take is spent.
-    pub fn is_done(&self, far: f64) -> bool {
-        self.work.error <= far || self.work.is_exhausted
+    pub fn is_done(&self) -> bool {
+        !self.is_far_from_solved() || self.work.is_exhausted
     }
 
     /// Takes note of what has changed.
@@ -158,23 +165,37 @@ impl ContactSystem {
 
     /// What the contacts and hard attachments of a body have put into all that they touch \[J\], with the bodies at their current
     /// positions: work on both of their sides, and the amount on one. Closing contacts and friction take some; attachments that are
-    /// solved make none, but by what brings together what was apart.
+    /// solved make none, but by what brings together what was apart. What undoes overlaps as it is asked to does not count: a step that was
+    /// rejected for it left the overlap, and was rejected again for ever.
     pub fn work_of(&mut self, index: usize, bodies: &[BodyProblem], context: &SolveContext<'_>) -> [f64; 2] {
         let reactions = self.collect_reactions(context);
-        let [mut made, mut exchanged] = [0.0; 2];
+        let [mut made, mut exchanged, mut recovered] = [0.0f64; 3];
         let at = |body: usize| &bodies[body].current.x[..];
         let counts = |c: &Constraint| matches!(c.law, Law::Contact { .. }) || c.is_hard_hold();
+        let has_loads = self.has_loads(context);
         for contact in self.active.iter().filter(|contact| counts(&contact.constraint)) {
             let constraint = &contact.constraint;
             if constraint.all_endpoints().any(|endpoint| endpoint.is_of(index)) {
                 let force = contact.force(&self.lambda);
-                made += force.dot(&relative_motion(constraint, bodies, at, context, &reactions));
+                let moved = relative_motion(constraint, bodies, at, context, &reactions);
+                made += force.dot(&moved);
+                if is_overlap(constraint, has_loads) {
+                    let asked = constraint.frame[0].dot(&moved).clamp(0.0, -constraint.target_gap);
+                    recovered += self.lambda[contact.first] * asked;
+                }
                 exchanged +=
                     force.dot(&motion(&constraint.endpoints[0], bodies, at, context, &reactions)).abs();
             }
         }
         self.reactions = reactions;
-        [made, exchanged]
+        // Of forces that are far from solved no more than one drawing apart would make of a rigid body.
+        let speed = context.limits.recovery_speed;
+        let most = if self.is_far_from_solved() {
+            0.5 * bodies[index].total_mass * speed * speed
+        } else {
+            f64::INFINITY
+        };
+        [made - recovered.min(most), exchanged]
     }
 
     /// Whether something holds a body fast.
@@ -267,6 +288,14 @@ impl ContactSystem {
             contact.constraint.for_each_force(&force, add);
         }
     }
+}
+
+/// Whether a step begins with the two in one another. Where there are loads that yield, deformable ones only: a heavy box that stands on a
+/// soft cube at `Fidelity::Preview` trembles if what lifts it counts too.
+fn is_overlap(constraint: &Constraint, has_loads: bool) -> bool {
+    let is_contact = matches!(constraint.law, Law::Contact { .. });
+    let counts = !has_loads || matches!(constraint.key, ConstraintKey::SoftPair(_));
+    is_contact && counts && constraint.target_gap < 0.0
 }
 
 /// Within what begins anew nothing is drawn apart.

@@ -35,7 +35,7 @@ fn a_matrix_taken_over_is_bit_by_bit_that_made_anew() {
         let (bodies, system) = (&mut island.bodies, &mut island.contacts);
         let mut late = system.candidates.split_off(system.candidates.len() / 2);
         assert!(system.activate(bodies, around.context, ALL) && late.len() > 2);
-        system.assemble(bodies, around);
+        system.assemble_for_newton(bodies, around);
         let mut kept = 0;
         for round in 0..4 {
             if round == 2 {
@@ -47,7 +47,7 @@ fn a_matrix_taken_over_is_bit_by_bit_that_made_anew() {
                 assert!(system.activate(bodies, around.context, ALL));
             }
             kept += system.active.iter().filter(|contact| contact.in_matrix.is_some()).count();
-            system.assemble(bodies, around);
+            system.assemble_for_newton(bodies, around);
             let (mut anew, mut W) = (Delassus::default(), BlockMatrix::default());
             let (contacts, groups) = (&mut system.active[..], &system.groups);
             let rows = ContactRows { contacts, offsets: &system.dense.problem.offsets, groups };
@@ -67,7 +67,7 @@ fn a_product_without_the_matrix_is_that_of_the_matrix() {
         let (bodies, system) = (&mut island.bodies, &mut island.contacts);
         bodies.iter_mut().for_each(|body| body.step_damping = 2.0);
         assert!(system.activate(bodies, around.context, ALL));
-        system.assemble(bodies, around);
+        system.assemble_for_newton(bodies, around);
         let rows = system.dense.problem.rows();
         assert!(rows >= 9);
         let v: Vec<f64> = (0..rows).map(|k| ((k * 37 % 101) as f64 - 50.0) * 0.1).collect();

@@ -19,13 +19,10 @@ const SHARE: f64 = 1.0 / 3.0;
 const SWEEPS: usize = 2;
 
 impl ContactSystem {
-    /// Brings W and W λ up to date, and Newton's expectation where the problem is another one.
-    pub(super) fn assemble(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) {
+    /// Brings W up to date; what has changed.
+    fn assemble(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) -> Change {
         let Around { factors, context, .. } = around;
         let change = std::mem::take(&mut self.dense.change);
-        if change == Change::Nothing {
-            return;
-        }
         let dense = &mut self.dense;
         if change > Change::Forces {
             let rows = ContactRows {
@@ -46,9 +43,18 @@ impl ContactSystem {
                 self.spent.operations += self.groups.condensation_work();
             }
         }
+        change
+    }
+
+    /// Brings W and W λ up to date, and Newton's expectation where the problem is another one.
+    pub(super) fn assemble_for_newton(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) {
+        let change = self.assemble(bodies, around);
+        if change == Change::Nothing {
+            return;
+        }
         self.dense.problem.multiply(&self.lambda, &mut self.dense.slips);
         if matches!(change, Change::Contacts | Change::Forces) {
-            self.predict(bodies, context);
+            self.predict(bodies, around.context);
         }
     }
 
@@ -83,7 +89,7 @@ impl ContactSystem {
         around: Around<'_>,
         effort: Effort,
     ) -> Option<bool> {
-        self.assemble(bodies, around);
+        self.assemble_for_newton(bodies, around);
         let tolerance =
             ConeTolerance { relative: around.tolerance.relative.min(LOOSEST), ..around.tolerance };
         self.before.clone_from(&self.lambda);
