@@ -179,7 +179,7 @@ impl ContactSystem {
                 let force = contact.force(&self.lambda);
                 let moved = relative_motion(constraint, bodies, at, context, &reactions);
                 made += force.dot(&moved);
-                if is_overlap(constraint, has_loads) {
+                if is_overlap(constraint, bodies, has_loads) {
                     let asked = constraint.frame[0].dot(&moved).clamp(0.0, -constraint.target_gap);
                     recovered += self.lambda[contact.first] * asked;
                 }
@@ -290,12 +290,17 @@ impl ContactSystem {
     }
 }
 
-/// Whether a step begins with the two in one another. Where there are loads that yield, deformable ones only: a heavy box that stands on a
-/// soft cube at `Fidelity::Preview` trembles if what lifts it counts too.
-fn is_overlap(constraint: &Constraint, has_loads: bool) -> bool {
+/// Whether a step begins with two solids in one another. Where there are loads that yield, deformable ones only: a heavy box that stands on
+/// a soft cube at `Fidelity::Preview` trembles if what lifts it counts too.
+fn is_overlap(constraint: &Constraint, bodies: &[BodyProblem], has_loads: bool) -> bool {
     let is_contact = matches!(constraint.law, Law::Contact { .. });
     let counts = !has_loads || matches!(constraint.key, ConstraintKey::SoftPair(_));
-    is_contact && counts && constraint.target_gap < 0.0
+    // Of sheets and ropes none is inside the other.
+    let is_solid = |endpoint: &Endpoint| match endpoint {
+        Endpoint::Soft { body, .. } => bodies[*body].model.surface.is_closed(),
+        Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => true,
+    };
+    is_contact && counts && constraint.target_gap < 0.0 && constraint.endpoints.iter().all(is_solid)
 }
 
 /// Within what begins anew nothing is drawn apart.
