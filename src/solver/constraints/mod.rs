@@ -29,6 +29,8 @@ mod improve;
 
 mod paths;
 
+mod overlaps;
+
 mod holds;
 
 mod with_matrix;

@@ -11,8 +11,9 @@ use super::gaps::{motion, relative_motion};
 use super::groups::ContactGroups;
 use super::lists::{ActiveContact, Candidate, ContactResult};
 use super::matrix_free::Response;
+use super::overlaps::is_overlap;
 use super::rigid_proxy::{Reaction, RigidProxies};
-use crate::body::{ConstraintKey, ConstraintMemory};
+use crate::body::ConstraintMemory;
 use crate::contact::{Constraint, Endpoint, Law};
 use crate::math::Vec3;
 use crate::solver::body_step::BodyProblem;
@@ -40,6 +41,8 @@ pub(crate) struct ContactSystem {
     pub(super) free: FreeSolve,
     pub work: ContactWork,
     pub(super) spent: Spent,
+    /// Energy that undoing overlaps may still make, by bodies \[J\].
+    pub(super) may_make: Vec<f64>,
 }
 
 /// What was spent of the step's budget.
@@ -288,19 +291,6 @@ impl ContactSystem {
             contact.constraint.for_each_force(&force, add);
         }
     }
-}
-
-/// Whether a step begins with two solids in one another. Where there are loads that yield, deformable ones only: a heavy box that stands on
-/// a soft cube at `Fidelity::Preview` trembles if what lifts it counts too.
-fn is_overlap(constraint: &Constraint, bodies: &[BodyProblem], has_loads: bool) -> bool {
-    let is_contact = matches!(constraint.law, Law::Contact { .. });
-    let counts = !has_loads || matches!(constraint.key, ConstraintKey::SoftPair(_));
-    // Of sheets and ropes none is inside the other.
-    let is_solid = |endpoint: &Endpoint| match endpoint {
-        Endpoint::Soft { body, .. } => bodies[*body].model.surface.is_closed(),
-        Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => true,
-    };
-    is_contact && counts && constraint.target_gap < 0.0 && constraint.endpoints.iter().all(is_solid)
 }
 
 /// Within what begins anew nothing is drawn apart.

@@ -1,0 +1,71 @@
+//! What undoing overlaps makes: a contact that a step begins with behind its surface is asked to give way at the recovery speed, which puts
+//! energy into what it moves.
+
+use super::context::SolveContext;
+use super::gaps::relative_motion;
+use super::system::ContactSystem;
+use crate::body::ConstraintKey;
+use crate::contact::{Constraint, Endpoint, Law};
+use crate::solver::body_step::BodyProblem;
+
+impl ContactSystem {
+    /// Whether what undoes overlaps of sheets and ropes has put more energy into one of them than its speed has.
+    pub fn forces_thin_apart(&mut self, bodies: &[BodyProblem], context: &SolveContext<'_>) -> bool {
+        if !self.active.iter().any(|contact| is_thin_overlap(&contact.constraint, bodies)) {
+            return false;
+        }
+        let reactions = self.collect_reactions(context);
+        let speed = context.limits.recovery_speed;
+        let mut may_make = std::mem::take(&mut self.may_make);
+        may_make.clear();
+        may_make.extend(bodies.iter().map(|body| 0.5 * body.total_mass * speed * speed));
+        for contact in self.active.iter().filter(|contact| is_thin_overlap(&contact.constraint, bodies)) {
+            let constraint = &contact.constraint;
+            let at = |body: usize| &bodies[body].current.x[..];
+            let moved = relative_motion(constraint, bodies, at, context, &reactions);
+            let asked = constraint.frame[0].dot(&moved).clamp(0.0, -constraint.target_gap);
+            for endpoint in &constraint.endpoints {
+                if let Endpoint::Soft { body, .. } = endpoint {
+                    may_make[*body] -= self.lambda[contact.first] * asked;
+                }
+            }
+        }
+        self.reactions = reactions;
+        let is_made = may_make.iter().any(|left| *left < 0.0);
+        self.may_make = may_make;
+        is_made
+    }
+
+    /// Lets overlaps of sheets and ropes get no deeper, and no less deep.
+    pub fn leave_thin_overlaps(&mut self, bodies: &[BodyProblem]) {
+        let candidates = self.candidates.iter_mut().map(|candidate| &mut candidate.constraint);
+        let active = self.active.iter_mut().map(|contact| &mut contact.constraint);
+        active.chain(candidates).filter(|c| is_thin_overlap(c, bodies)).for_each(|c| c.target_gap = 0.0);
+    }
+}
+
+/// Whether a step begins with two solids in one another. Where there are loads that yield, deformable ones only: a heavy box that stands on
+/// a soft cube at `Fidelity::Preview` trembles if what lifts it counts too.
+pub(super) fn is_overlap(constraint: &Constraint, bodies: &[BodyProblem], has_loads: bool) -> bool {
+    let counts = !has_loads || matches!(constraint.key, ConstraintKey::SoftPair(_));
+    // Of sheets and ropes none is inside the other.
+    counts && is_contact_within(constraint) && constraint.endpoints.iter().all(|e| is_solid(e, bodies))
+}
+
+/// Whether a step begins with a sheet or a rope behind the surface of another deformable body. Under what weighs on a cloth the work is that
+/// of the weight, and counts for nothing.
+fn is_thin_overlap(constraint: &Constraint, bodies: &[BodyProblem]) -> bool {
+    let is_soft = matches!(constraint.key, ConstraintKey::SoftPair(_));
+    is_soft && is_contact_within(constraint) && !constraint.endpoints.iter().all(|e| is_solid(e, bodies))
+}
+
+fn is_contact_within(constraint: &Constraint) -> bool {
+    matches!(constraint.law, Law::Contact { .. }) && constraint.target_gap < 0.0
+}
+
+fn is_solid(endpoint: &Endpoint, bodies: &[BodyProblem]) -> bool {
+    match endpoint {
+        Endpoint::Soft { body, .. } => bodies[*body].model.surface.is_closed(),
+        Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => true,
+    }
+}
