@@ -75,9 +75,14 @@ fn touching_pairs([a, b]: [&SoftSurface<'_>; 2], pairs: &[(u32, u32)]) -> Vec<(u
     let mut touching: Vec<_> = pairs.iter().copied().filter(|&(ta, tb)| touch(a, ta, b, tb)).collect();
     touching.sort_unstable();
     let mut taken = vec![false; b.model.surface.triangles.len()];
-    touching.dedup_by(|pair, last| {
-        // A triangle of the second that is taken is none for another.
-        pair.0 == last.0 || std::mem::replace(&mut taken[pair.1 as usize], true)
+    let mut last = None;
+    touching.retain(|&(ta, tb)| {
+        let is_free = last != Some(ta) && !taken[tb as usize];
+        if is_free {
+            last = Some(ta);
+            taken[tb as usize] = true;
+        }
+        is_free
     });
     let every = touching.len().div_ceil(HANDLES).max(1);
     touching.into_iter().step_by(every).collect()

@@ -44,12 +44,9 @@ impl ContactSystem {
     }
 }
 
-/// Whether a step begins with two solids in one another. Where there are loads that yield, deformable ones only: a heavy box that stands on
-/// a soft cube at `Fidelity::Preview` trembles if what lifts it counts too.
-pub(super) fn is_overlap(constraint: &Constraint, bodies: &[BodyProblem], has_loads: bool) -> bool {
-    let counts = !has_loads || matches!(constraint.key, ConstraintKey::SoftPair(_));
-    // Of sheets and ropes none is inside the other.
-    counts && is_contact_within(constraint) && constraint.endpoints.iter().all(|e| is_solid(e, bodies))
+/// Whether a step begins with two solids in one another: of sheets and ropes none is inside the other.
+pub(super) fn is_overlap(constraint: &Constraint, bodies: &[BodyProblem]) -> bool {
+    is_contact_within(constraint) && constraint.endpoints.iter().all(|e| is_solid(e, bodies))
 }
 
 /// Whether a step begins with a sheet or a rope behind the surface of another deformable body. Under what weighs on a cloth the work is that
