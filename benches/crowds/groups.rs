@@ -40,6 +40,8 @@ pub fn heaps(all: bool, report: &mut Report) {
         let runs = both(&scene);
         let ratios = compare(&scene, &runs, report);
         let [ours, theirs] = &runs;
+        let error = ours.counters.iter().map(|c| c.contact_error).fold(0.0, f64::max);
+        report.measure(&scene.name, ERROR, error);
         let detection = detection(ours);
         report.measure(&scene.name, DETECTION, detection);
         let detection = format!("detection {:.1} %", 1e2 * detection);
