@@ -21,7 +21,7 @@ const BESIDE: f64 = 0.02;
 /// Cosine beyond which two triangles of one surface are one face.
 const COPLANAR: f64 = 0.9999;
 /// Cosine beyond which two constraints push the same way.
-const PARALLEL: f64 = 0.9;
+pub(super) const PARALLEL: f64 = 0.9;
 /// Depth, in mean edges, of an overlap that another contact of the two has made impossible.
 const LATE: f64 = 2.0;
 

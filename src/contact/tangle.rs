@@ -3,6 +3,7 @@
 //! what is around the triangles that cut one another.
 
 use super::constraint::{Constraint, Endpoint};
+use super::soft_contact::PARALLEL;
 use super::soft_surface::{SoftSurface, near_in_mesh};
 use crate::body::{ConstraintKey, SoftPairContact, SoftPairKind};
 use crate::math::{Vec3, to_real};
@@ -22,8 +23,8 @@ const CLEARLY: f64 = 0.1;
 
 /// Appends constraints that draw apart what is tangled, as fast as overlaps are recovered, on triangles that go through one
 /// another; `pairs` are triangles whose boxes meet. Where faces of the two lie in the same planes none go through, as of boxes that were
-/// put into one another along an axis: of bodies that have no other contacts, which `looks_at_touching` says, triangles that touch serve
-/// too.
+/// put into one another along an axis: of bodies that have no other contacts, which `looks_at_touching` says, triangles that touch and
+/// look the same way serve too.
 pub(super) fn untangle(
     surfaces: [&SoftSurface<'_>; 2],
     pairs: &[(u32, u32)],
@@ -45,10 +46,12 @@ pub(super) fn untangle(
         let apart = *apart.get_or_insert_with(|| way_apart(surfaces));
         constraints.push(constraint(a, ta, b, tb, apart));
     }
-    if looks_at_touching && constraints.len() == first && !pairs.is_empty() && are_deep(surfaces) {
-        let apart = way_apart(surfaces);
+    if looks_at_touching && constraints.len() == first {
         let touching = touching_pairs(surfaces, pairs);
-        constraints.extend(touching.iter().map(|&(ta, tb)| constraint(a, ta, b, tb, apart)));
+        if !touching.is_empty() && are_deep(surfaces) {
+            let apart = way_apart(surfaces);
+            constraints.extend(touching.iter().map(|&(ta, tb)| constraint(a, ta, b, tb, apart)));
+        }
     }
     constraints[first..].sort_unstable_by_key(|constraint| constraint.key);
 }
@@ -73,6 +76,9 @@ fn way_apart([a, b]: [&SoftSurface<'_>; 2]) -> Vec3 {
 /// Some pairs of triangles that touch, no triangle twice, from all over where they do.
 fn touching_pairs([a, b]: [&SoftSurface<'_>; 2], pairs: &[(u32, u32)]) -> Vec<(u32, u32)> {
     let mut touching: Vec<_> = pairs.iter().copied().filter(|&(ta, tb)| touch(a, ta, b, tb)).collect();
+    if touching.is_empty() {
+        return touching;
+    }
     touching.sort_unstable();
     let mut taken = vec![false; b.model.surface.triangles.len()];
     let mut last = None;
@@ -88,8 +94,11 @@ fn touching_pairs([a, b]: [&SoftSurface<'_>; 2], pairs: &[(u32, u32)]) -> Vec<(u
     touching.into_iter().step_by(every).collect()
 }
 
-/// Whether two triangles are as good as on one another.
+/// Whether two triangles look the same way and are as good as on one another.
 fn touch(a: &SoftSurface<'_>, ta: u32, b: &SoftSurface<'_>, tb: u32) -> bool {
+    if a.faces[ta as usize].dot(&b.faces[tb as usize]) < PARALLEL {
+        return false;
+    }
     let clearly = CLEARLY * a.model.surface.mean_edge.min(b.model.surface.mean_edge);
     let [p, q] = [corners(a, ta), corners(b, tb)]
         .map(|[a, b, c]| Triangle::new(to_real(&a), to_real(&b), to_real(&c)));
