@@ -45,7 +45,7 @@ const CLAIMS: &[Claim] = &[
     claim("heap of 48 cubes", MEAN, 0.34),
     claim("heap of 48 cubes", WORST, 0.31),
     claim("heap of 48 cubes", WORST_TO_SETTLED, 3.0),
-    claim("heap of 48 cubes", DETECTION, 0.19),
+    claim("heap of 48 cubes", DETECTION, 0.28),
     claim("heap of 48 cubes", THREADS, 1.4),
     claim("heap of 100 cubes", MEAN, 0.33),
     claim("heap of 100 cubes", WORST, 0.53),
