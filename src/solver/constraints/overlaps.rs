@@ -3,9 +3,11 @@
 
 use super::context::SolveContext;
 use super::gaps::relative_motion;
+use super::lists::ActiveContact;
 use super::system::ContactSystem;
 use crate::body::ConstraintKey;
 use crate::contact::{Constraint, Endpoint, Law};
+use crate::math::Vec3;
 use crate::solver::body_step::BodyProblem;
 
 impl ContactSystem {
@@ -23,10 +25,10 @@ impl ContactSystem {
             let constraint = &contact.constraint;
             let at = |body: usize| &bodies[body].current.x[..];
             let moved = relative_motion(constraint, bodies, at, context, &reactions);
-            let asked = constraint.frame[0].dot(&moved).clamp(0.0, -constraint.target_gap);
+            let recovered = self.work_of_recovery(contact, &moved);
             for endpoint in &constraint.endpoints {
                 if let Endpoint::Soft { body, .. } = endpoint {
-                    may_make[*body] -= self.lambda[contact.first] * asked;
+                    may_make[*body] -= recovered;
                 }
             }
         }
@@ -34,6 +36,12 @@ impl ContactSystem {
         let is_made = may_make.iter().any(|left| *left < 0.0);
         self.may_make = may_make;
         is_made
+    }
+
+    /// What the force along the normal of a contact that overlaps has done \[J\] on its way out, as far as that was asked for.
+    pub(super) fn work_of_recovery(&self, contact: &ActiveContact, moved: &Vec3) -> f64 {
+        let constraint = &contact.constraint;
+        self.lambda[contact.first] * constraint.frame[0].dot(moved).clamp(0.0, -constraint.target_gap)
     }
 
     /// Lets overlaps of sheets and ropes get no deeper, and no less deep.

@@ -182,10 +182,9 @@ impl ContactSystem {
                 let moved = relative_motion(constraint, bodies, at, context, &reactions);
                 made += force.dot(&moved);
                 if is_overlap(constraint, bodies) {
-                    let asked = constraint.frame[0].dot(&moved).clamp(0.0, -constraint.target_gap);
                     let is_soft = matches!(constraint.key, ConstraintKey::SoftPair(_));
                     *if is_soft { &mut recovered } else { &mut from_rigid } +=
-                        self.lambda[contact.first] * asked;
+                        self.work_of_recovery(contact, &moved);
                 }
                 exchanged +=
                     force.dot(&motion(&constraint.endpoints[0], bodies, at, context, &reactions)).abs();
