@@ -15,6 +15,7 @@ pub(crate) mod cone;
 
 pub(crate) mod constraints;
 
+mod guard;
 mod island;
 mod rejected_steps;
 

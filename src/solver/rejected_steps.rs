@@ -80,7 +80,7 @@ impl Island {
         }
         if solves {
             self.contacts.outdate(Change::Contacts);
-            self.solve_contacts(context);
+            self.solve_contacts(false, context);
         }
         let mut turned = false;
         for body in &mut self.bodies {

@@ -13,7 +13,7 @@ use crate::solver::cone::{ConeTolerance, Effort};
 
 /// Bodies of an island from which on it is a crowd: Newton's method does not climb its continuation there. Towers of
 /// fewer carry rigid loads, which sweeps do not.
-pub(super) const CROWD: usize = 6;
+pub(crate) const CROWD: usize = 6;
 /// Operations of a small island's factorizations in a step, at the most, before sweeps take over: a millisecond or two.
 const LIGHT_WORK: usize = 20_000_000;
 /// The same of what is still, or overlaps after sweeps.

@@ -42,6 +42,7 @@ mod tests;
 
 pub(crate) use activation::Slack;
 pub(crate) use context::{ContactLimits, SolveContext};
+pub(crate) use improve::CROWD;
 pub(crate) use lists::ContactResult;
 pub(crate) use rigid_proxy::{Articulation, Reaction, RigidProxies, RigidProxy, Twist};
 pub(crate) use system::{Change, ContactSystem, ContactWork, FAR_FROM_SOLVED};
