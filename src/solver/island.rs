@@ -223,12 +223,17 @@ impl Island {
             }
         }
         let (contacts, trials) = (&self.contacts, &self.trials);
-        for_each_pair(&mut self.bodies, &mut self.accelerations, self.is_large, |index, body, acceleration| {
-            if !trials[index].waits {
-                acceleration.learn(acceleration_of(body, contacts), body);
-                body.accept_trial();
-            }
-        });
+        for_each_pair(
+            &mut self.bodies,
+            &mut self.accelerations,
+            self.is_large,
+            |index, body, acceleration| {
+                if !trials[index].waits {
+                    acceleration.learn(acceleration_of(body, contacts), body);
+                    body.accept_trial();
+                }
+            },
+        );
         outcome
     }
 
