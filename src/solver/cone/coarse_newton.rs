@@ -5,17 +5,20 @@
 //! `½‖p‖² + zᵀV p + Σ ½R(‖u‖² − ‖u − Π(u)‖²)` [Moreau 1965]: Newton's method on as many numbers as there are modes.
 
 use super::metric::{ConeMetric, MetricContact, Modes, STILL, dot_modes, norm_squared};
-use super::problem::dot;
+use super::problem::{dot, product};
 use super::projection;
 use super::secant;
 use crate::math::lanes::Lane;
 use crate::math::vectorized;
 use crate::solver::linear::{BlockFactor, MODES};
 
-/// Newton steps of a coarse problem at the most.
+/// Newton steps of a coarse problem at the most, and where those have not come to a change along which the objective falls.
 const STEPS: usize = 4;
+const STEPS_TO_DESCENT: usize = 32;
 /// Part of the first gradient that is left. At a tenth heaps are four times as deep in the floor.
 const INEXACTNESS: f64 = 1.0e-3;
+/// Part of it that rounding leaves.
+const ROUNDING: f64 = 1.0e-12;
 /// Trials of a line search.
 const TRIALS: usize = 10;
 
@@ -190,14 +193,16 @@ impl CoarseNewton {
         let bodies = problem.metric.bodies;
         self.p.clear();
         self.p.resize(bodies, STILL);
-        let mut wanted = f64::INFINITY;
-        for step in 0..=STEPS {
+        let mut first = 0.0;
+        for step in 0..=STEPS_TO_DESCENT {
             project(problem, &self.p, &mut self.u, &mut self.gradient, [&mut *d, &mut *Vp]);
             let norm = self.gradient.iter().map(norm_squared).sum::<f64>().sqrt();
             if step == 0 {
-                wanted = INEXACTNESS * norm;
+                first = norm;
             }
-            if step == STEPS || !(norm > wanted) || !self.factorize(problem) {
+            let is_enough = step >= STEPS || !(norm > INEXACTNESS * first);
+            let is_end = step == STEPS_TO_DESCENT || !(norm > ROUNDING * first);
+            if is_end || is_enough && product(problem.r, d) < 0.0 || !self.factorize(problem) {
                 return;
             }
             self.solved.clear();

@@ -122,6 +122,10 @@ pub(in crate::solver) fn spatial(rows: &[f64]) -> [f64; 3] {
     }
 }
 
+pub(super) fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 #[inline(always)]
 pub(super) fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

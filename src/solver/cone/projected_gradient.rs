@@ -6,7 +6,7 @@
 
 use super::coarse_newton::{CoarseNewton, CoarseProblem};
 use super::metric::ConeMetric;
-use super::problem::ConeTolerance;
+use super::problem::{ConeTolerance, product};
 
 /// Memory for solves.
 #[derive(Default)]
@@ -94,8 +94,4 @@ impl ProjectedGradient {
             self.alpha = alpha.clamp(ALPHAS[0], ALPHAS[1]);
         }
     }
-}
-
-fn product(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
