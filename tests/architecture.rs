@@ -34,7 +34,7 @@ const SOLVER: [&[&str]; 7] = [
     &["acceleration"],
     &["cone"],
     &["constraints"],
-    &["island", "rejected_steps"],
+    &["guard", "island", "rejected_steps"],
 ];
 
 /// Within the command's package, from the ground up.

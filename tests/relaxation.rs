@@ -1,6 +1,8 @@
 //! Maxwell branches: creep, loss and stiffness against closed forms, on every kind of element; no energy made.
 mod common;
-use common::thin::{positions, straight};
+#[cfg(feature = "serde-serialize")]
+use common::thin::positions;
+use common::thin::straight;
 use common::*;
 use foible3d::prelude::*;
 use nalgebra::Vector3;

@@ -4,7 +4,8 @@
 //! `x ← y + P Jᵀ(λ − λ⁰)`, and the guard. H is P, or its quasi-Newton update: at the fixed point
 //! λ = λ⁰ both ask for `r + Jᵀλ = 0`. If the guard finds no sufficient decrease of `Ψ − λᵀJx`, the acceleration forgets
 //! its memory, then the preconditioner is damped (P → P/c, as by A → cA), and the iteration is done again, contact problem
-//! included: shortening the step instead would break the contacts that were just solved.
+//! included: shortening the step instead would break the contacts that were just solved. In a crowd the few that it is to be done again for
+//! wait for the next iteration.
 
 use super::counters::SolveCounters;
 use super::guard::{Guard, Trial};
@@ -58,6 +59,7 @@ const BEFORE_SOLVE: Slack = Slack { edges: 0.01, motions: 0.05 };
 const AFTER_SOLVE: Slack = Slack { edges: -1.0e-5, motions: 0.05 };
 /// Part of the contacts that may close after a solve and wait for the next iteration of a crowd.
 const FEW_LATE: f64 = 0.01;
+
 impl Island {
     /// Does the iterations of a step of `h` \[s\]; results are in the bodies' `current` and in the
     /// contacts' forces.
@@ -122,10 +124,7 @@ impl Island {
                 let gained = self.bodies[index].is_alpha()
                     && (self.would_be_rejected(index, context) || self.bodies[index].gained_much(in_flight));
                 if gained {
-                    let body = &mut self.bodies[index];
-                    body.restart_first_order();
-                    body.choose_initial_guess(context.factors.get(body.factor));
-                    self.accelerations[index].clear();
+                    self.begin_again(index, context);
                     again = true;
                 }
             }
@@ -144,13 +143,19 @@ impl Island {
             return;
         }
         self.contacts.leave_thin_overlaps(&self.bodies);
-        for (body, acceleration) in self.bodies.iter_mut().zip(&mut self.accelerations) {
-            body.restart_first_order();
-            body.choose_initial_guess(context.factors.get(body.factor));
-            acceleration.clear();
+        for index in 0..self.bodies.len() {
+            self.begin_again(index, context);
         }
         self.contacts.begin_again();
         self.iterate_until_done(context);
+    }
+
+    /// Begins the step of a body again, by implicit Euler.
+    fn begin_again(&mut self, index: usize, context: &SolveContext<'_>) {
+        let body = &mut self.bodies[index];
+        body.restart_first_order();
+        body.choose_initial_guess(context.factors.get(body.factor));
+        self.accelerations[index].clear();
     }
 
     /// Ends the step of what touches nothing. Where it is far from solved and makes energy, it is done again by implicit

@@ -11,8 +11,8 @@ use crate::contact::{Endpoint, Law};
 use crate::solver::body_step::{BodyProblem, Factors};
 use crate::solver::cone::{ConeTolerance, Effort};
 
-/// Bodies of an island from which on it is a crowd: Newton's method does not climb its continuation there. Towers of
-/// fewer carry rigid loads, which sweeps do not.
+/// Bodies of an island from which on it is a crowd: Newton's method does not climb its continuation there, and the few wait for the next
+/// iteration. Towers of fewer carry rigid loads, which sweeps do not.
 pub(crate) const CROWD: usize = 6;
 /// Operations of a small island's factorizations in a step, at the most, before sweeps take over: a millisecond or two.
 const LIGHT_WORK: usize = 20_000_000;
