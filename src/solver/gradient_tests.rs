@@ -1,7 +1,8 @@
 //! Projected gradients against the optimum, and wherever they are stopped.
 
 use super::cone::{
-    ConeMetric, ConeOperator, ConeProblem, ConeTolerance, MetricContact, MetricSide, ProjectedGradient, STILL,
+    ConeMetric, ConeOperator, ConeProblem, ConeTolerance, GradientBudget, MetricContact, MetricSide,
+    ProjectedGradient, STILL,
 };
 use super::linear::{BlockMatrix, MODES};
 use super::tests::{brute_force, objective, random_problem};
@@ -35,7 +36,8 @@ fn solve(problem: &ConeProblem, products: usize) -> Vec<f64> {
     let mut method = ProjectedGradient::default();
     method.begin();
     let tolerance = ConeTolerance { relative: 1e-12, floor: 1e-9 };
-    let work = method.solve(&metric, [&mut z, &mut r], tolerance, products, &mut Dense(problem));
+    let budget = GradientBudget { products, goes_on: false };
+    let work = method.solve(&metric, [&mut z, &mut r], tolerance, budget, &mut Dense(problem));
     assert!(work.products <= products);
     z
 }
@@ -109,7 +111,8 @@ proptest! {
         let mut method = ProjectedGradient::default();
         method.begin();
         let tolerance = ConeTolerance { relative: 1e-3, floor: 1e-9 };
-        let work = method.solve(&metric, [&mut z, &mut r], tolerance, 10, &mut Dense(&problem));
+        let budget = GradientBudget { products: 10, goes_on: true };
+        let work = method.solve(&metric, [&mut z, &mut r], tolerance, budget, &mut Dense(&problem));
         prop_assert!(work.error <= tolerance.relative || work.products == 10, "{work:?}");
     }
 }

@@ -12,7 +12,7 @@ use crate::math::lanes::Lane;
 use crate::math::vectorized;
 use crate::solver::linear::{BlockFactor, MODES};
 
-/// Newton steps of a coarse problem at the most, and where those have not come to a change along which the objective falls.
+/// Newton steps of a coarse problem at the most, and of one that goes on.
 const STEPS: usize = 4;
 const STEPS_TO_DESCENT: usize = 32;
 /// Part of the first gradient that is left. At a tenth heaps are four times as deep in the floor.
@@ -41,6 +41,8 @@ pub(super) struct CoarseProblem<'a> {
     pub z: &'a [f64],
     pub r: &'a [f64],
     pub alpha: f64,
+    /// Where its steps have come to no change along which the objective falls, it goes on until they do.
+    pub goes_on: bool,
 }
 
 impl CoarseProblem<'_> {
@@ -202,7 +204,8 @@ impl CoarseNewton {
             }
             let is_enough = step >= STEPS || !(norm > INEXACTNESS * first);
             let is_end = step == STEPS_TO_DESCENT || !(norm > ROUNDING * first);
-            if is_end || is_enough && product(problem.r, d) < 0.0 || !self.factorize(problem) {
+            let goes_on = problem.goes_on && !is_end && !(product(problem.r, d) < 0.0);
+            if is_enough && !goes_on || !self.factorize(problem) {
                 return;
             }
             self.solved.clear();

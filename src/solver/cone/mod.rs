@@ -22,7 +22,7 @@ mod secant;
 
 pub(crate) use condensation::{Condensation, Condensed};
 pub(crate) use metric::{ConeMetric, MetricContact, MetricSide, Modes, STILL};
-pub(crate) use projected_gradient::{ConeOperator, ProjectedGradient};
+pub(crate) use projected_gradient::{ConeOperator, GradientBudget, ProjectedGradient};
 
 pub(crate) use newton::{ConeSolver, Effort};
 #[cfg(test)]

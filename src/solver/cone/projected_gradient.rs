@@ -27,6 +27,14 @@ pub(crate) struct GradientWork {
     pub error: f64,
 }
 
+/// What a solve may take.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GradientBudget {
+    pub products: usize,
+    /// As [`CoarseProblem::goes_on`].
+    pub goes_on: bool,
+}
+
 /// What W does, and who wants to know how far the forces went along what was multiplied.
 pub(crate) trait ConeOperator {
     /// `out = W v`.
@@ -46,18 +54,18 @@ impl ProjectedGradient {
         self.alpha = FIRST_ALPHA;
     }
 
-    /// Improves forces z with gradient `r = W z + b`, which is kept so, by at most `budget` products.
+    /// Improves forces z with gradient `r = W z + b`, which is kept so, within a budget.
     pub fn solve(
         &mut self,
         metric: &ConeMetric,
         [z, r]: [&mut [f64]; 2],
         tolerance: ConeTolerance,
-        budget: usize,
+        GradientBudget { products, goes_on }: GradientBudget,
         operator: &mut impl ConeOperator,
     ) -> GradientWork {
         let mut work = GradientWork { products: 0, error: metric.error(z, r, tolerance) };
-        while work.error > tolerance.relative && work.products < budget {
-            let problem = CoarseProblem { metric, z, r, alpha: self.alpha };
+        while work.error > tolerance.relative && work.products < products {
+            let problem = CoarseProblem { metric, z, r, alpha: self.alpha, goes_on };
             self.coarse.solve(&problem, [&mut self.d, &mut self.VVd]);
             let slope = product(r, &self.d);
             if !(slope < 0.0) {

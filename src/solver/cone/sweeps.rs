@@ -111,21 +111,16 @@ impl ConeSweeps {
             let least = problem.whole_diagonal.get(problem.offsets[i]).map_or(0.0, |w| EPSILON * w);
             let local = LocalProblem::new(block, rows.len(), at, force.len(), least);
             let wanted = local.solve(force, &own[at..at + force.len()], problem.laws[i]);
-            let mut moves = false;
             for (k, force) in force.iter_mut().enumerate() {
                 let d = wanted[k] - *force;
                 *force = wanted[k];
                 largest = largest.max(force.abs());
-                self.change[at + k] = d;
                 if d != 0.0 {
                     change = if d.is_nan() { f64::NAN } else { change.max(d.abs()) };
-                    moves = true;
+                    self.change[at + k] = d;
+                    let column = &block[(at + k) * rows.len()..(at + k + 1) * rows.len()];
+                    own.iter_mut().zip(column).for_each(|(gap, w)| *gap += w * d);
                 }
-            }
-            if moves {
-                let columns = at..at + force.len();
-                let block = &block[columns.start * rows.len()..columns.end * rows.len()];
-                dense::add_product(block, &self.change[columns], own);
             }
         }
         if change != 0.0 {

@@ -6,7 +6,7 @@ use super::improve::{Around, LOOSE};
 use super::matrix_free::MatrixFree;
 use super::system::{Change, ContactSystem};
 use crate::solver::body_step::BodyProblem;
-use crate::solver::cone::ConeTolerance;
+use crate::solver::cone::{ConeTolerance, GradientBudget};
 
 /// Solves with a fresh shift.
 const SHIFT_ROUNDS: usize = 4;
@@ -81,6 +81,9 @@ impl ContactSystem {
         aim: Aim,
     ) -> bool {
         self.before.clone_from(&self.lambda);
+        // Under rigid loads a solve that ended there left forces off by six times their size. Without any, a foot of 1e4 Pa under 128 kg
+        // that goes on goes 9 cm into the floor at 5 m/s and 1/30 s (`tests/regions.rs` allows 6).
+        let budget = GradientBudget { products: aim.products, goes_on: self.has_loads(context) };
         let free = &mut self.free;
         let mut operator = MatrixFree {
             contacts: &self.active,
@@ -91,7 +94,7 @@ impl ContactSystem {
         };
         let forces = [&mut self.lambda[..], &mut free.r[..]];
         let rough = ConeTolerance { relative: tolerance.relative.max(aim.error), ..tolerance };
-        let done = free.method.solve(&free.metric, forces, rough, aim.products, &mut operator);
+        let done = free.method.solve(&free.metric, forces, rough, budget, &mut operator);
         self.work.products += done.products;
         self.spent.iterations += PRODUCT_COST * done.products;
         self.outdate(Change::Forces);
