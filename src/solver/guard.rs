@@ -58,11 +58,7 @@ impl Island {
             }
             body.guard_retries += 1;
             trial.waits = may_wait;
-            if may_wait {
-                body.reject_trial();
-            } else {
-                guard.again = true;
-            }
+            guard.again |= !may_wait;
         }
         if damped {
             self.contacts.outdate(Change::Factors);

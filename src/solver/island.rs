@@ -267,11 +267,12 @@ impl Island {
         for round in 0..ROUNDS {
             let slack = if round == 0 { BEFORE_SOLVE } else { AFTER_SOLVE };
             let before = self.contacts.active.len();
-            let has_more = self.contacts.activate(&self.bodies, context, slack);
-            let late = self.contacts.active.len() - before;
-            self.late = round > 0 && has_more && may_wait && late as f64 <= FEW_LATE * before as f64;
-            if self.late || round > 0 && !has_more {
-                break;
+            let entered = self.contacts.activate(&self.bodies, context, slack);
+            if round > 0 {
+                self.late = may_wait && entered > 0 && entered as f64 <= FEW_LATE * before as f64;
+                if self.late || entered == 0 {
+                    break;
+                }
             }
             let (contacts, bodies) = (&mut self.contacts, &mut self.bodies);
             let time = &mut self.report.counters.contact_time;

@@ -50,10 +50,10 @@ impl ContactSystem {
     }
 
     /// Activates constraints that end less than `slack` from touching at the bodies' trial positions under the present
-    /// forces; true if there were such.
-    pub fn activate(&mut self, bodies: &[BodyProblem], context: &SolveContext<'_>, slack: Slack) -> bool {
+    /// forces; how many there were.
+    pub fn activate(&mut self, bodies: &[BodyProblem], context: &SolveContext<'_>, slack: Slack) -> usize {
         if self.candidates.is_empty() {
-            return false;
+            return 0;
         }
         let reactions = self.collect_reactions(context);
         for candidate in &mut self.candidates {
@@ -65,8 +65,9 @@ impl ContactSystem {
             let motion = (end - constraint.target_gap).abs();
             *end < slack.edges * shorter_edge(constraint, bodies) + slack.motions * motion
         });
-        if self.active.len() == before {
-            return false;
+        let entered = self.active.len() - before;
+        if entered == 0 {
+            return 0;
         }
         for contact in &mut self.active[..before] {
             contact.constraint.warm_force = contact.force(&self.lambda);
@@ -74,7 +75,7 @@ impl ContactSystem {
             contact.constraint.warm_geometry = Some(contact.geometry);
         }
         self.pack(bodies.len(), context);
-        true
+        entered
     }
 
     /// Moves candidates into the problem; both lists keep their order.
