@@ -20,6 +20,10 @@ pub(super) const NEW_EDGES: EdgeTolerance = EdgeTolerance { beside: -1.0e-3, ask
 pub(super) const CARRYING_EDGES: EdgeTolerance =
     EdgeTolerance { beside: STILL_BESIDE, askew: 0.6, crossing: 0.05 };
 
+/// Part of both thicknesses by which edges may overlap where they come over one another from the side. Of twelve strips that fold, five had contacts along
+/// their width, a thickness deep, for a step; what slides over an edge comes onto it less than a hundredth deep.
+const ACROSS: f64 = 0.5;
+
 /// Two edges across one another.
 pub(super) struct Crossing {
     /// Places on the two edges, 0 at their first nodes.
@@ -74,18 +78,22 @@ pub(super) fn crossing(
     let way = mean_motion(a, [i, j]) - mean_motion(b, [k, l]);
     let closing = Closing::new(height, -normal.dot(&way));
     // In the plane of both: p + s u = q + t v.
-    let w = q - p - way * closing.when;
-    let squared = length * length;
-    let s = w.cross(&v).dot(&across) / squared;
-    let t = w.cross(&u).dot(&across) / squared;
+    let places = |way: Vec3| {
+        let w = q - p - way;
+        [w.cross(&v), w.cross(&u)].map(|side| side.dot(&across) / (length * length))
+    };
     let inside = |t: f64| t > -tolerance.beside && t < 1.0 + tolerance.beside;
+    let [s, t] = places(way * closing.when);
     // Most edges pass one another beyond their ends: what takes longer comes last.
     let crosses = inside(s)
         && inside(t)
         && (thin[0] || looks_along(a, ea, &outward_a, &-normal, tolerance.askew))
         && (thin[1] || looks_along(b, eb, &outward_b, &normal, tolerance.askew));
-    let gap = height - skin(a, [i, j], s) - skin(b, [k, l], t);
-    crosses.then_some(Crossing { places: [s, t], normal, gap, closing })
+    let skins = skin(a, [i, j], s) + skin(b, [k, l], t);
+    let gap = height - skins;
+    // Borders of a sheet that folds are above one another in the plane of both: what comes from the side and is deep at once is not across.
+    let comes_across = gap > -ACROSS * skins || last.is_some() || places(Vec3::zeros()).into_iter().all(inside);
+    (crosses && comes_across).then_some(Crossing { places: [s, t], normal, gap, closing })
 }
 
 /// How far the farther of two nodes may come \[m\].

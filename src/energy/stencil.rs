@@ -1,11 +1,11 @@
-//! Whatever has a length that it wants to keep: `w/2·(‖b‖ − l)²` with `b = Σ cᵢ xᵢ` over up to four nodes.
+//! Whatever has a length that it wants to keep: `w/2·(‖b‖ − l)²` with `b = Σ cᵢ xᵢ`.
 //! Projected on a sphere of radius l [Bouaziz et al. 2014].
 //!
 //! | kind | b | l |
 //! |---|---|---|
 //! | spring, rod | from one end to the other | rest length |
 //! | bent rod | change of direction per length, times the length | that at rest |
-//! | bent sheet | mean curvature normal of a hinge [Bergou et al. 2006] | that at rest |
+//! | bent sheet | normal times twice the mean curvature, and twice its deviator [1/m] | that at rest |
 //! | muscle fibre | the stretched direction F m [–] | the stretch asked for |
 
 use super::strain_limit::excess;
@@ -18,10 +18,18 @@ pub(crate) enum StencilKind {
     Stretch,
     /// A rod's resistance to bending.
     RodBending,
-    /// A sheet's resistance to bending.
-    SheetBending,
+    /// A sheet's resistance to what bends it alike in all directions: `κ₁₁ + κ₂₂`.
+    MeanCurvature,
+    /// A sheet's resistance to what bends it to a saddle: `κ₁₁ − κ₂₂`, `2 κ₁₂`.
+    SaddleCurvature,
     /// A muscle fibre, whose length is the activation.
     Fibre,
+}
+
+impl StencilKind {
+    pub fn is_of_sheets(self) -> bool {
+        matches!(self, Self::MeanCurvature | Self::SaddleCurvature)
+    }
 }
 
 /// A length that is kept.

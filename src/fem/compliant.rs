@@ -83,7 +83,7 @@ impl ElementMultipliers {
             energy += 0.5 * triangle.volume * (inverse(&stiffness(&strains, &modes)) * S).dot(S);
         }
         for (stencil, S) in model.stencils.iter().zip(&self.stencils) {
-            let weight = length_energy(stencil, materials, activations).weight;
+            let weight = length_energy(&stencil, materials, activations).weight;
             energy += if weight > 0.0 { 0.5 * S.norm_squared() / weight } else { 0.0 };
         }
         energy
@@ -108,7 +108,7 @@ impl ElementMultipliers {
             }
         }
         for (stencil, S) in elements.model.stencils.iter().zip(&self.stencils) {
-            let own = length_energy(stencil, elements.materials, elements.activations);
+            let own = length_energy(&stencil, elements.materials, elements.activations);
             let pull = length_direction(&own, &stencil.vector(x)).map_or(*S, |direction| direction * S.x);
             stencil.terms().for_each(|(n, c)| force[n] -= pull * c);
         }
@@ -154,12 +154,11 @@ impl ElementMultipliers {
     ) {
         let Elements { model, materials, activations } = elements;
         for (k, (stencil, multiplier)) in model.stencils.iter().zip(&mut self.stencils).enumerate() {
-            let own = length_energy(stencil, materials, activations);
+            let own = length_energy(&stencil, materials, activations);
             let b = stencil.vector(x);
             let (mut pull, mut tangent) = (own.response(&b).1, own.tangent(&b));
             if let Some(&length) = damping.stretches.lengths.get(k) {
-                let [one, other] = stencil.regions.map(|region| damping.ratios[region as usize]);
-                let weight = 0.5 * (one + other) * own.weight;
+                let weight = stencil.mean(|region| damping.ratios[region as usize]) * own.weight;
                 let damper = LengthEnergy { length, weight, limits: None };
                 pull += damper.response(&b).1;
                 tangent += damper.tangent(&b);

@@ -87,10 +87,9 @@ fn add_thin_bounds(
             }
         }
     }
-    for stencil in &model.stencils {
-        let stiffening = stencil.regions.map(|region| stiffening(&materials[region as usize]));
-        let stiffening = 0.5 * (stiffening[0] + stiffening[1]);
-        let weight = length_energy(stencil, materials, activations).weight * stiffening;
+    for stencil in model.stencils.iter() {
+        let stiffening = stencil.mean(|region| stiffening(&materials[region as usize]));
+        let weight = length_energy(&stencil, materials, activations).weight * stiffening;
         for (i, a) in stencil.terms() {
             for (j, b) in stencil.terms() {
                 add(i, j, weight * a * b);

@@ -71,7 +71,7 @@ fn limited_pieces<'a>(elements: &Elements<'a>) -> impl Iterator<Item = (Piece, [
     let triangles = (0..).zip(&model.triangles);
     let triangles = triangles.filter_map(move |(k, t)| Some((Piece::Triangle(k), limits(t.region)?)));
     let is_bar = |kind| matches!(kind, StencilKind::Stretch);
-    let bars = (0..).zip(&model.stencils).filter(move |(_, s)| is_bar(s.kind) && s.length > 0.0);
+    let bars = (0..).zip(model.stencils.iter()).filter(move |(_, s)| is_bar(s.kind) && s.length > 0.0);
     let bars = bars.filter_map(move |(k, s)| Some((Piece::Bar(k), limits(s.regions[0])?)));
     solid.chain(triangles).chain(bars)
 }
@@ -240,12 +240,13 @@ fn stretched(piece: &Piece, model: &DeformableModel, x: &[Vec3]) -> Stretched {
             ([a, b, c, a], 2)
         }
         Piece::Bar(s) => {
-            let bar = &model.stencils[*s as usize];
+            let bar = model.stencils.get(*s as usize);
             let vector = bar.vector(x);
             let length = vector.norm();
             let u = vector.try_normalize(0.0).unwrap_or_else(Vec3::x);
-            axes[0] = (u, length / bar.length, bar.coefficients.map(|c| c / bar.length));
-            (bar.nodes, 1)
+            let ([a, b], [c, d]) = ([0, 1].map(|k| bar.nodes[k]), [0, 1].map(|k| bar.coefficients[k]));
+            axes[0] = (u, length / bar.length, [c / bar.length, d / bar.length, 0.0, 0.0]);
+            ([a, b, a, a], 1)
         }
     };
     Stretched { nodes, axes, count }

@@ -7,7 +7,9 @@ mod elements;
 mod patches;
 mod regions;
 mod rigid_regions;
+mod sheet_bending;
 mod smoothing;
+mod stencils;
 mod thin_structure;
 
 mod model;

@@ -1,13 +1,14 @@
 //! The constant part of a body: rest mesh, elements, surface, node order.
 
 use super::cavities::{Cavity, DeformableCavity, cavities};
-use super::elements::{ElementBlock, Stencil, TriangleElement};
+use super::elements::{ElementBlock, TriangleElement};
 use super::regions::{Region, VolumeShares, blocks, set_ranges};
 use super::smoothing::SmoothingDomains;
+use super::stencils::Stencils;
 use super::thin_structure::ThinElements;
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
-use crate::mesh::{MeshError, Structure, Surface, TetMesh, node_adjacency, sweep_order};
+use crate::mesh::{MeshError, Structure, Surface, TetMesh, sweep_order};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -30,8 +31,8 @@ pub struct DeformableModel {
     pub(crate) volume_domains: SmoothingDomains,
     /// Triangles of sheets, region by region.
     pub(crate) triangles: Vec<TriangleElement>,
-    /// What keeps lengths: springs, rods, hinges of sheets, muscle fibres.
-    pub(crate) stencils: Vec<Stencil>,
+    /// What keeps lengths: springs, rods, bends of sheets, muscle fibres.
+    pub(crate) stencils: Stencils,
     /// Distance of the surface from each node \[m\]: half the thickness of a sheet, the radius of a rod.
     pub(crate) half_thickness: Vec<f64>,
     /// Each node's share of the volume of the elements around it: a quarter of a tetrahedron's \[m³\].
@@ -40,7 +41,7 @@ pub struct DeformableModel {
     pub(crate) adjacency: Vec<Vec<u32>>,
     /// Nodes that belong to no tetrahedron, each with the nearest one that does.
     pub(crate) frame_sources: Vec<(u32, u32)>,
-    /// Nodes that each node has a block of the matrix with: as `adjacency`, unless smoothed.
+    /// Nodes that each node has a block of the matrix with: as `adjacency`, but of sheets, which bend over patches, and smoothed.
     pub(crate) coupling: Vec<Vec<u32>>,
     /// The boundary.
     pub(crate) surface: Surface,
@@ -130,8 +131,7 @@ impl DeformableModel {
             let block = ElementBlock::new(&[tet], &self.rest);
             let volume = crate::mesh::signed_volume(&tet.map(|n| self.rest[n as usize]));
             let region = self.regions.partition_point(|region| region.tetrahedra.end <= *place as usize);
-            let fibre = Stencil::fibre(tet, &block.shape_gradients(0), volume, along);
-            self.stencils.push(Stencil { regions: [region as u32; 2], ..fibre });
+            self.stencils.add_fibre(tet, &block.shape_gradients(0), volume, along, region as u32);
         }
         self.fibres.extend_from_slice(fibres);
     }
@@ -167,15 +167,13 @@ impl DeformableModel {
         let surface = Surface::new(&tetrahedra, &sheets, &thin.segments, &rest);
         let low = rest.iter().fold(rest[0], |a, b| a.inf(b));
         let high = rest.iter().fold(rest[0], |a, b| a.sup(b));
-        let thin_nodes = thin.triangles.iter().map(|t| &t.nodes[..]);
-        let thin_nodes = thin_nodes.chain(thin.stencils.iter().map(|s| &s.nodes[..]));
-        let adjacency = node_adjacency(tetrahedra.iter().map(|t| &t[..]).chain(thin_nodes), rest.len());
+        let [adjacency, coupling] = thin.adjacencies(&tetrahedra, rest.len());
         let cavities = cavities(&surface, &rest);
         Self {
             id: next_id(),
             blocks,
             frame_sources: frame_sources(&adjacency, solid),
-            coupling: adjacency.clone(),
+            coupling,
             adjacency,
             volume: regions.iter().map(|region| region.volume).sum(),
             regions,
@@ -302,7 +300,7 @@ impl DeformableModel {
             + size_of_val(&self.tetrahedra[..])
             + size_of_val(&self.blocks[..])
             + size_of_val(&self.triangles[..])
-            + size_of_val(&self.stencils[..])
+            + self.stencils.bytes()
             + 2 * size_of_val(&self.node_volumes[..])
             + self.adjacency.iter().chain(&self.coupling).map(|a| 24 + 4 * a.len()).sum::<usize>()
             + self.domains.bytes()

@@ -3,6 +3,7 @@
 
 use super::elements::ElementBlock;
 use super::model::DeformableModel;
+use super::stencils::Stencil;
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
 use crate::math::lanes::LANES;
@@ -148,8 +149,9 @@ impl DeformableModel {
         let own = &self.regions[place];
         let mut nodes: Vec<u32> = self.tetrahedra[own.tetrahedra.clone()].iter().flatten().copied().collect();
         nodes.extend(self.triangles[own.triangles.clone()].iter().flat_map(|t| t.nodes));
-        let stencils = self.stencils.iter().filter(|s| s.regions == [place as u32; 2]);
-        nodes.extend(stencils.flat_map(|s| s.nodes));
+        // Those of bent sheets are their triangles', and reach beyond.
+        let is_own = |s: &Stencil<'_>| s.regions == [place as u32; 4] && !s.kind.is_of_sheets();
+        nodes.extend(self.stencils.iter().filter(is_own).flat_map(|s| s.nodes));
         let mut vertices: Vec<usize> = nodes.into_iter().map(|n| self.vertex(n as usize)).collect();
         vertices.sort_unstable();
         vertices.dedup();

@@ -60,7 +60,7 @@ impl DeformableModel {
         for smoothed in [&self.domains, &self.volume_domains] {
             smoothed.for_each(0..smoothed.block_count(), |element| domains.push(element.nodes.to_vec()));
         }
-        let stencils = self.stencils.iter().map(|s| &s.nodes[..]);
+        let stencils = self.stencils.iter().map(|s| s.nodes);
         let thin = self.triangles.iter().map(|t| &t.nodes[..]).chain(stencils);
         let solid = self.tetrahedra.iter().map(|t| &t[..]).chain(domains.iter().map(|p| &p[..]));
         self.coupling = node_adjacency(solid.chain(thin), self.rest.len());

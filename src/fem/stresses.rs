@@ -76,9 +76,9 @@ pub(crate) fn section_forces(
     x: &[Vec3],
 ) -> (Vec<f64>, Vec<(u32, Vec3)>) {
     let (mut tensions, mut moments) = (Vec::new(), Vec::new());
-    for stencil in &model.stencils {
+    for stencil in model.stencils.iter() {
         let b = stencil.vector(x);
-        let pull = length_energy(stencil, materials, &[]).response(&b).1;
+        let pull = length_energy(&stencil, materials, &[]).response(&b).1;
         match stencil.kind {
             // Over the length at rest, as energy has it: the pull is along b.
             StencilKind::Stretch => tensions.push(pull.dot(&b) / b.norm().max(f64::MIN_POSITIVE)),

@@ -70,8 +70,8 @@ impl Stretches {
             }
         }
         for (k, stencil) in model.stencils.iter().enumerate() {
-            let [a, b] = stencil.regions.map(|region| region as usize);
-            let by = (other.lengths[k] - self.lengths[k]) * ratio(parts[a] + parts[b], wholes[a] + wholes[b]);
+            let [part, whole] = [parts, wholes].map(|shares| stencil.mean(|region| shares[region as usize]));
+            let by = (other.lengths[k] - self.lengths[k]) * ratio(part, whole);
             self.lengths[k] += by;
         }
     }
@@ -85,7 +85,7 @@ impl Stretches {
             own.iter().zip(other).map(of).fold(0.0, f64::max)
         };
         let sheets = self.sheets.iter().zip(&other.sheets).map(|(a, b)| (a - b).amax());
-        let lengths = self.lengths.iter().zip(&other.lengths).zip(&model.stencils);
+        let lengths = self.lengths.iter().zip(&other.lengths).zip(model.stencils.iter());
         let lengths = lengths.filter(|(_, s)| s.length > 0.0).map(|((a, b), s)| (a - b).abs() / s.length);
         let solid = blocks(&self.solid, &other.solid).max(blocks(&self.patches, &other.patches));
         sheets.chain(lengths).fold(solid, f64::max)

@@ -40,10 +40,9 @@ pub(crate) fn add_tangents(
         let weights = modes.map(|m| kept(m.stiffness) * scale);
         add_products(&triangle.nodes, &weights, &sides, &mut add);
     }
-    for stencil in &model.stencils {
-        let sides = stencil.regions.map(|region| stiffening(&materials[region as usize]));
-        let tangent = length_energy(stencil, materials, activations).tangent(&stencil.vector(x));
-        let mut K = tangent * (0.5 * (sides[0] + sides[1]));
+    for stencil in model.stencils.iter() {
+        let stiffening = stencil.mean(|region| stiffening(&materials[region as usize]));
+        let mut K = length_energy(&stencil, materials, activations).tangent(&stencil.vector(x)) * stiffening;
         if projected {
             K = semidefinite(&K);
         }

@@ -1,8 +1,8 @@
 //! Sheets, rods, springs and fibres: their elements, made of a structure, and their energy and forces.
 
-use super::elements::Stencil;
 use super::model::Elements;
 use super::regions::Region;
+use super::stencils::Stencil;
 use super::stretches::Stretches;
 use crate::energy::membrane::Membrane;
 use crate::energy::stencil::{LengthEnergy, StencilKind};
@@ -18,29 +18,31 @@ pub(super) fn membrane(material: &DeformableMaterial) -> Membrane {
     }
 }
 
-/// What the weight per modulus of a stencil is to be multiplied by \[Pa\]. Two sides that differ share a moment, and each
-/// has half of the bend: they are as stiff as two springs in a row.
-fn modulus(stencil: &Stencil, materials: &[DeformableMaterial]) -> f64 {
-    let [a, b] = stencil.regions.map(|region| &materials[region as usize]);
-    let first = modulus_of(stencil.kind, a);
-    if stencil.regions[0] == stencil.regions[1] {
-        return first;
+/// What the weight per modulus of a stencil is to be multiplied by \[Pa\]. What differs shares a moment, and each has its share of
+/// the bend: they are as stiff as springs in a row.
+fn modulus(stencil: &Stencil<'_>, materials: &[DeformableMaterial]) -> f64 {
+    let of = |region: u32| modulus_of(stencil.kind, &materials[region as usize]);
+    let [first, others @ ..] = stencil.regions;
+    if others == [first; 3] {
+        return of(first);
     }
-    2.0 / (1.0 / first + 1.0 / modulus_of(stencil.kind, b))
+    1.0 / stencil.mean(|region| 1.0 / of(region))
 }
 
+/// Of a plate `D/2·((1 + ν)/2·(κ₁₁ + κ₂₂)² + (1 − ν)/2·((κ₁₁ − κ₂₂)² + 4 κ₁₂²))` per area, `D = E t³/12(1 − ν²)`.
 fn modulus_of(kind: StencilKind, material: &DeformableMaterial) -> f64 {
     let nu = material.poisson_ratio;
     match kind {
         StencilKind::Stretch | StencilKind::RodBending => material.youngs_modulus,
-        StencilKind::SheetBending => material.youngs_modulus / (1.0 - nu * nu),
+        StencilKind::MeanCurvature => 0.5 * material.youngs_modulus / (1.0 - nu),
+        StencilKind::SaddleCurvature => 0.5 * material.youngs_modulus / (1.0 + nu),
         StencilKind::Fibre => material.fibre_modulus,
     }
 }
 
 /// What keeps the length of a stencil of a body.
 pub(super) fn length_energy(
-    stencil: &Stencil,
+    stencil: &Stencil<'_>,
     materials: &[DeformableMaterial],
     activations: &[f64],
 ) -> LengthEnergy {
@@ -71,12 +73,11 @@ pub(super) fn add_forces(
         energy += add_triangles(region, elements, material, (damping, ratio), x, force);
     }
     for (k, stencil) in model.stencils.iter().enumerate() {
-        let length_energy = length_energy(stencil, materials, activations);
+        let length_energy = length_energy(&stencil, materials, activations);
         let b = stencil.vector(x);
         let (mut own, mut pull) = length_energy.response(&b);
         if let Some(&length) = damping.lengths.get(k) {
-            let [one, other] = stencil.regions.map(|region| ratios[region as usize]);
-            let weight = 0.5 * (one + other) * length_energy.weight;
+            let weight = stencil.mean(|region| ratios[region as usize]) * length_energy.weight;
             let damper = LengthEnergy { length, weight, limits: None };
             let (damped, drag) = damper.response(&b);
             (own, pull) = (own + damped, pull + drag);

@@ -1,17 +1,21 @@
-//! Sheets, rods, springs and hinges of a structure as elements.
+//! Sheets, rods and springs of a structure as elements.
 
-use super::elements::{Stencil, TriangleElement};
+use super::elements::TriangleElement;
 use super::regions::VolumeShares;
+use super::sheet_bending::{SheetPiece, add_sheet_bends};
+use super::stencils::Stencils;
 use crate::math::Vec3;
-use crate::mesh::{Rod, Structure};
+use crate::mesh::{Rod, Structure, node_adjacency};
 use std::collections::BTreeMap;
 
 /// What a structure has besides tetrahedra, in nodes.
 pub(super) struct ThinElements {
     pub triangles: Vec<TriangleElement>,
-    pub stencils: Vec<Stencil>,
+    pub stencils: Stencils,
     /// Of rods.
     pub segments: Vec<[u32; 2]>,
+    /// Corners of triangles opposite of each edge that two share.
+    pub across_edges: Vec<[u32; 2]>,
     pub half_thickness: Vec<f64>,
 }
 
@@ -26,12 +30,12 @@ impl ThinElements {
     ) -> Self {
         let mut thin = Self {
             triangles: Vec::new(),
-            stencils: Vec::new(),
+            stencils: Stencils::default(),
             segments: Vec::new(),
+            across_edges: Vec::new(),
             half_thickness: vec![0.0; rest.len()],
         };
-        // Hinges by their edge: the opposite corners, thicknesses and regions of one or two triangles.
-        let mut hinges: BTreeMap<[u32; 2], Vec<(u32, f64, u32)>> = BTreeMap::new();
+        let mut pieces = Vec::with_capacity(structure.sheets.len());
         for sheet in &structure.sheets {
             let (nodes, region) = (sheet.corners.map(&node), shares.place(sheet.region));
             let mut triangle = TriangleElement::new(nodes, sheet.thickness, rest);
@@ -41,29 +45,31 @@ impl ThinElements {
             shares.add(region, &nodes, triangle.volume);
             thin.thicken(&nodes, sheet.thickness / 2.0);
             thin.triangles.push(TriangleElement { region, ..triangle });
-            for k in 0..3 {
-                let (a, b) = (nodes[(k + 1) % 3], nodes[(k + 2) % 3]);
-                hinges.entry([a.min(b), a.max(b)]).or_default().push((nodes[k], sheet.thickness, region));
-            }
+            pieces.push(SheetPiece { nodes, thickness: sheet.thickness, region });
         }
-        for (edge, sides) in &hinges {
-            if let [(a, t, r), (b, u, s)] = sides[..] {
-                let hinge = Stencil::hinge(*edge, [a, b], 0.5 * (t + u), rest);
-                thin.stencils.push(Stencil { regions: [r, s], ..hinge });
-            }
-        }
+        thin.across_edges = add_sheet_bends(&mut thin.stencils, &pieces, rest);
         thin.triangles.sort_by_key(|triangle| triangle.region);
         for rod in &structure.rods {
             thin.add_rod(rod, &node, rest, shares);
         }
         for spring in &structure.springs {
-            let bar = Stencil::bar(spring.ends.map(&node), spring.area, rest);
-            thin.stencils.push(Stencil { regions: [shares.place(spring.region); 2], ..bar });
+            thin.stencils.add_bar(spring.ends.map(&node), spring.area, rest, shares.place(spring.region));
         }
         if structure.is_network {
             thin.add_network(tetrahedra, rest);
         }
         thin
+    }
+
+    /// Nodes that share an element with each of `nodes`; and those that it has a block of the matrix with. Sheets bend over patches of
+    /// triangles: what is as far apart as those may touch.
+    pub fn adjacencies(&self, tetrahedra: &[[u32; 4]], nodes: usize) -> [Vec<Vec<u32>>; 2] {
+        let triangles = self.triangles.iter().map(|t| &t.nodes[..]);
+        let elements = tetrahedra.iter().map(|t| &t[..]).chain(triangles);
+        let near = self.stencils.iter().filter(|s| !s.kind.is_of_sheets()).map(|s| s.nodes);
+        let near = near.chain(self.across_edges.iter().map(|pair| &pair[..]));
+        let all = self.stencils.iter().map(|s| s.nodes);
+        [node_adjacency(elements.clone().chain(near), nodes), node_adjacency(elements.chain(all), nodes)]
     }
 
     fn add_rod(&mut self, rod: &Rod, node: impl Fn(u32) -> u32, rest: &[Vec3], shares: &mut VolumeShares) {
@@ -72,10 +78,9 @@ impl ThinElements {
         let area = std::f64::consts::PI * rod.radius * rod.radius;
         for (ends, &region) in points.windows(2).zip(&regions) {
             let ends = [ends[0], ends[1]];
-            let bar = Stencil::bar(ends, area, rest);
-            shares.add(region, &ends, bar.length * area);
+            let length = self.stencils.add_bar(ends, area, rest, region);
+            shares.add(region, &ends, length * area);
             self.thicken(&ends, rod.radius);
-            self.stencils.push(Stencil { regions: [region; 2], ..bar });
             self.segments.push(ends);
         }
         let (mut bends, mut sides) = (points.clone(), regions);
@@ -85,8 +90,7 @@ impl ThinElements {
             sides.push(sides[0]);
         }
         for (bend, sides) in bends.windows(3).zip(sides.windows(2)).filter(|(p, _)| p[0] != p[2]) {
-            let stencil = Stencil::rod_bend([bend[0], bend[1], bend[2]], rod.radius, rest);
-            self.stencils.push(Stencil { regions: [sides[0], sides[1]], ..stencil });
+            self.stencils.add_rod_bend([bend[0], bend[1], bend[2]], rod.radius, rest, [sides[0], sides[1]]);
         }
     }
 
@@ -111,8 +115,7 @@ impl ThinElements {
         }
         for ((region, ends), volume) in around {
             let [a, b] = ends.map(|n| rest[n as usize]);
-            let bar = Stencil::bar(ends, volume / (b - a).norm(), rest);
-            self.stencils.push(Stencil { regions: [region; 2], ..bar });
+            self.stencils.add_bar(ends, volume / (b - a).norm(), rest, region);
         }
     }
 }

@@ -82,8 +82,8 @@ impl Structure {
         Self { is_network: true, ..Self::solid(mesh) }
     }
 
-    /// A sheet of triangles, `thickness` \[m\]: cloth, paper, shells. A hinge keeps the angle by which it is bent at rest,
-    /// to either side.
+    /// A sheet of triangles, `thickness` \[m\]: cloth, paper, shells. It bends as a thin plate does, however it is cut into triangles, and keeps the
+    /// curvature that it has at rest, to either side.
     ///
     /// # Errors
     /// What is wrong with the triangles or the thickness.
@@ -95,8 +95,7 @@ impl Structure {
 
     /// A flat rectangle in the plane of x and z, centred at the origin, of `cells[1]` strips along x that are cut
     /// into `2 cells[0] + 1` triangles each: every other row of vertices is shifted by half a cell, so that
-    /// triangles of cells of `1 : 0.87` are equilateral. Hinges bend such lattices alike in all directions, and
-    /// those of right triangles do not.
+    /// triangles of cells of `1 : 0.87` are equilateral.
     ///
     /// # Errors
     /// [`MeshError::BadLattice`] without cells or extent; a bad thickness.
