@@ -178,7 +178,7 @@ fn check(corners: &[Corner]) -> usize {
         corners.len()
     );
     // Once 3.3 times the energy of the impact in one step.
-    assert!(bad == 0 && most < 1.0, "as printed");
+    assert!(bad == 0 && most < 0.6, "as printed");
     known
 }
 
@@ -190,5 +190,5 @@ fn every_eleventh_corner_holds() {
 #[test]
 #[ignore = "slow tier"]
 fn every_corner_holds() {
-    assert!(check(&corners()) <= 75);
+    assert!(check(&corners()) <= 60);
 }

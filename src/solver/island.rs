@@ -28,6 +28,8 @@ pub(crate) struct Island {
     pub(super) trials: Vec<Trial>,
     /// Contacts wait for the next iteration.
     pub(super) late: bool,
+    /// Sheets or ropes are caught in something: what drew them apart made energy.
+    pub(super) are_caught: bool,
     /// Its bodies are worth several threads.
     pub(super) is_large: bool,
     pub(super) newton_factors: NewtonFactors,
@@ -66,6 +68,7 @@ impl Island {
     pub fn solve(&mut self, context: &SolveContext<'_>) {
         self.report = IslandReport::default();
         self.newton_factors.begin(self.bodies.len());
+        self.are_caught = false;
         self.is_large = are_large(&self.bodies);
         self.trials.resize(self.bodies.len(), Trial::default());
         self.accelerations.resize_with(self.bodies.len(), Accelerator::default);
@@ -148,6 +151,7 @@ impl Island {
         }
         self.contacts.begin_again();
         self.iterate_until_done(context);
+        self.are_caught = true;
     }
 
     /// Begins the step of a body again, by implicit Euler.

@@ -18,7 +18,7 @@ impl Island {
         loop {
             let mut gains = false;
             for index in 0..self.bodies.len() {
-                if self.would_be_rejected(index, context) {
+                if self.would_be_rejected(index, context) || self.is_forced_while_caught(index, context) {
                     self.bodies[index].is_rejected = true;
                     gains = true;
                 }
@@ -28,6 +28,15 @@ impl Island {
             }
             self.step_rigid_fallbacks(context);
         }
+    }
+
+    /// Whether contacts have put energy into what is caught: without a way out none does, unless it is far from where they were solved.
+    fn is_forced_while_caught(&mut self, index: usize, context: &SolveContext<'_>) -> bool {
+        if !self.are_caught || self.bodies[index].is_rejected {
+            return false;
+        }
+        let [made, exchanged] = self.contacts.work_of(index, &self.bodies, context);
+        made > MADE_OF_EXCHANGED * exchanged
     }
 
     pub(super) fn would_be_rejected(&mut self, index: usize, context: &SolveContext<'_>) -> bool {
