@@ -92,7 +92,8 @@ pub(super) fn crossing(
     let skins = skin(a, [i, j], s) + skin(b, [k, l], t);
     let gap = height - skins;
     // Borders of a sheet that folds are above one another in the plane of both: what comes from the side and is deep at once is not across.
-    let comes_across = gap > -ACROSS * skins || last.is_some() || places(Vec3::zeros()).into_iter().all(inside);
+    let comes_across =
+        gap > -ACROSS * skins || last.is_some() || places(Vec3::zeros()).into_iter().all(inside);
     (crosses && comes_across).then_some(Crossing { places: [s, t], normal, gap, closing })
 }
 
