@@ -241,3 +241,57 @@ fn strips_of_two_stiffnesses_bend_as_beams_of_them() {
         assert!((beside - 1.0).abs() < 0.25 && (after - 1.0).abs() < 0.06, "{cut:?} {beside} {after}");
     }
 }
+
+/// Sheets of few triangles, and of such that are all there is around one another.
+fn odd_sheets() -> Vec<(&'static str, Vec<[f64; 3]>, Vec<[u32; 3]>)> {
+    let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let prism = [0.0, 1.0]
+        .into_iter()
+        .flat_map(|z| [0.0, 2.0, 4.0].map(|k: f64| [(k * PI / 3.0).cos(), (k * PI / 3.0).sin(), z]));
+    let around = |k: u32| [[k, (k + 1) % 3, 3 + (k + 1) % 3], [k, 3 + (k + 1) % 3, 3 + k]];
+    let fan = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-0.5, 0.9, 0.0], [-0.5, -0.9, 0.0]];
+    let sliver = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 1e-3, 0.0], [0.5, -1.0, 0.0], [1.5, 1.0, 0.0]];
+    let book = vec![[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.5, 0.0], [1.0, 0.5, 1e-3]];
+    vec![
+        ("triangle", corners[..3].to_vec(), vec![[0, 1, 2]]),
+        ("two triangles", corners.clone(), vec![[0, 1, 2], [1, 0, 3]]),
+        ("tetrahedron", corners, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
+        ("prism", prism.collect(), (0..3).flat_map(around).collect()),
+        ("fan of three", fan, vec![[0, 1, 2], [0, 2, 3], [0, 3, 1]]),
+        ("sliver", sliver, vec![[0, 1, 2], [1, 0, 3], [2, 1, 4]]),
+        ("shut book", book, vec![[0, 1, 2], [1, 0, 3]]),
+    ]
+}
+
+#[test]
+fn odd_sheets_keep_their_shape_and_spin_freely() {
+    for (name, points, triangles) in odd_sheets() {
+        let sheet = Structure::sheet(points.clone(), &triangles, 0.02).unwrap();
+        for young in [1e4, 1e9] {
+            let (mut physics, mut world) = (PhysicsWorld::new(), DeformableWorld::new());
+            physics.gravity = Vector::ZERO;
+            let body = || {
+                let body = DeformableBodyBuilder::structure(&sheet).can_sleep(false);
+                body.material(DeformableMaterial::new(young, 0.3).mass_damping(0.0))
+            };
+            let still = world.insert(body()).unwrap();
+            let thrown = body().translation(Vector::X * 10.0).angvel(Vector::new(0.3, 0.2, 0.1));
+            let thrown = world.insert(thrown).unwrap();
+            let before = total_energy(&world.bodies[thrown]);
+            for _ in 0..120 {
+                world.step(&mut physics);
+            }
+            let [still, thrown] = [still, thrown].map(|handle| &world.bodies[handle]);
+            let off = points.iter().enumerate().map(|(v, p)| {
+                let x = still.position(v).unwrap();
+                (0..3).map(|k| (x[k] - p[k]).abs()).fold(0.0, f64::max)
+            });
+            let off = off.fold(0.0, f64::max);
+            let energy = total_energy(thrown) / before;
+            println!(
+                "{name}, {young:.0e} Pa: off by {off:.1e} m at rest, {energy:.4} of its energy spinning"
+            );
+            assert!(off < 1e-9 && (0.9..1.0001).contains(&energy), "{name} {young:e}: {off} {energy}");
+        }
+    }
+}
