@@ -26,8 +26,8 @@ pub enum Solver {
     Xpbd,
     /// The diagonal that bounds the constant matrix [Wang 2015]: cheapest and least exact.
     Jacobi,
-    /// Newton's method: the second derivatives of the energy itself, factored anew in iterations that the last factor did not bring far. The
-    /// reference, and right for ropes and cloth.
+    /// Newton's method: the second derivatives of the energy itself, factored anew in every iteration. The
+    /// reference, and right for ropes and stiff cloth.
     Newton,
 }
 
@@ -154,13 +154,8 @@ impl Build {
         match self {
             Self::Solid => defaults,
             // Their largest force is at the pins, hundreds of times that on other nodes.
-            Self::LargeSheet => {
-                SolverSettings { system: SystemMatrix::Laplacian, tolerance: 1.0e-3, ..defaults }
-            }
-            // The constant matrix leaves a square metre of cotton 7 cm off after 8 s, and 1e8 Pa swaying for half a minute; one iteration rejects
-            // 86 of 120 steps of 441 vertices on a ball.
-            Self::Sheet => SolverSettings { solver: Solver::Newton, max_iterations: 2, ..defaults },
-            // The constant matrix rejects what lies on a floor in every step.
+            Self::Sheet => SolverSettings { system: SystemMatrix::Laplacian, tolerance: 1.0e-3, ..defaults },
+            // The constant matrix leaves stiff ones swaying for half a minute, and rejects what lies on a floor in every step.
             Self::SmallSheet => SolverSettings { solver: Solver::Newton, max_iterations: 3, ..defaults },
             Self::Rope => SolverSettings { solver: Solver::Newton, ..defaults },
         }

@@ -74,22 +74,17 @@ pub(crate) struct Elements<'a> {
 pub(crate) enum Build {
     /// Tetrahedra, with or without anything else.
     Solid,
-    /// Sheets.
+    /// Sheets or springs.
     Sheet,
     /// Such of few vertices.
     SmallSheet,
-    /// Such of very many, and networks of springs.
-    LargeSheet,
     /// Nothing but rods.
     Rope,
 }
 
-/// Most vertices of a sheet that has three iterations of Newton's method if nothing else is asked for; larger ones have two. A third takes 1.4 times as long on
-/// a ball.
+/// Most vertices of a sheet that is solved by Newton's method if nothing else is asked for: it takes 1.6 to 2.2 times as long in
+/// a strip of 205 vertices, a third in a cloth of 169 on a floor, four times as long in one of 441 that hangs, nine in one of 1681.
 const SMALL_SHEET: usize = 256;
-/// Most vertices of a sheet that is solved by Newton's method if nothing else is asked for. On a ball it takes 2.5 times as long as the constant matrix at 441
-/// vertices and 2.4 times at 1681, and four times at 441 that hang; with one iteration, five times at 6561.
-const NEWTON_SHEET: usize = 2048;
 
 /// A name that no other model has.
 pub(super) fn next_id() -> u64 {
@@ -214,9 +209,6 @@ impl DeformableModel {
     pub(crate) fn build(&self) -> Build {
         match (self.is_solid(), self.surface.triangles.is_empty()) {
             (true, _) => Build::Solid,
-            (false, false) if !self.tetrahedra.is_empty() || self.vertex_count() > NEWTON_SHEET => {
-                Build::LargeSheet
-            }
             (false, false) if self.vertex_count() <= SMALL_SHEET => Build::SmallSheet,
             (false, false) => Build::Sheet,
             (false, true) => Build::Rope,

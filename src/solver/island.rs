@@ -160,7 +160,6 @@ impl Island {
         body.restart_first_order();
         body.choose_initial_guess(context.factors.get(body.factor));
         self.accelerations[index].clear();
-        self.newton_factors.forget(index);
     }
 
     /// Ends the step of what touches nothing. Where it is far from solved and makes energy, it is done again by implicit
@@ -178,7 +177,6 @@ impl Island {
         }
         if again {
             self.accelerations.iter_mut().for_each(Accelerator::clear);
-            self.newton_factors.begin(self.bodies.len());
             self.iterate_until_done(context);
             self.balance();
             self.bodies

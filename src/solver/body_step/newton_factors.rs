@@ -1,5 +1,5 @@
-//! Factors of bodies that are solved by Newton's method: of the Hessian where the iteration is, with the columns that the body's contacts
-//! want. One is kept for as long as it makes the residual small fast (the chord method, [Kelley 1995]).
+//! Factors of bodies that are solved by Newton's method: of the Hessian where the iteration is, made anew in
+//! every iteration, with the columns that the body's contacts want.
 
 use super::problem::BodyProblem;
 use crate::body::Solver;
@@ -31,16 +31,10 @@ impl<'a> Factors<'a> {
     }
 }
 
-/// Part of a residual that an iteration leaves at the most if its factor is kept for the next one. A strip of 1377 vertices and 1e8 Pa takes 17.6, 8.0
-/// and 7.2 ms a step at 0, 0.1 and 0.5 with three iterations, and ends 1e-6, 1e-6 and 2e-5 m off.
-const KEPT: f64 = 0.1;
-
 /// The factors that the bodies of an island have made themselves.
 #[derive(Default)]
 pub(crate) struct NewtonFactors {
     made: Vec<Option<OwnFactor>>,
-    /// Of the bodies, where the last iteration began \[N\].
-    residuals: Vec<f64>,
     count: u64,
     scratch: FactorScratch,
 }
@@ -56,16 +50,9 @@ impl NewtonFactors {
     pub fn begin(&mut self, bodies: usize) {
         self.made.clear();
         self.made.resize_with(bodies, || None);
-        self.residuals.clear();
-        self.residuals.resize(bodies, 0.0);
     }
 
-    /// Forgets that of a body whose step begins again.
-    pub fn forget(&mut self, index: usize) {
-        self.made[index] = None;
-    }
-
-    /// Makes the factors at the bodies' current states, where the last ones are not good enough; true if some were made.
+    /// Makes the factors at the bodies' current states; true if there are bodies that want them.
     pub fn refresh<'a>(
         &mut self,
         bodies: &mut [BodyProblem],
@@ -75,12 +62,6 @@ impl NewtonFactors {
         let mut some = false;
         for (index, body) in bodies.iter_mut().enumerate() {
             if body.settings.solver != Solver::Newton {
-                continue;
-            }
-            let residual = body.residual();
-            let last = std::mem::replace(&mut self.residuals[index], residual);
-            let is_damped = body.step_damping > body.scale;
-            if self.made[index].is_some() && residual <= KEPT * last && !is_damped {
                 continue;
             }
             some = true;
