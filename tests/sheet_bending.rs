@@ -242,8 +242,11 @@ fn strips_of_two_stiffnesses_bend_as_beams_of_them() {
     }
 }
 
+/// A name, points [m] and triangles.
+type Odd = (&'static str, Vec<[f64; 3]>, Vec<[u32; 3]>);
+
 /// Sheets of few triangles, and of such that are all there is around one another.
-fn odd_sheets() -> Vec<(&'static str, Vec<[f64; 3]>, Vec<[u32; 3]>)> {
+fn odd_sheets() -> Vec<Odd> {
     let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let prism = [0.0, 1.0]
         .into_iter()
