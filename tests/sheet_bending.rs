@@ -155,8 +155,9 @@ fn strips_bend_as_beams_do_on_any_triangles_and_of_any_width() {
         for wide in [1, 2, 4, 12] {
             let (cell, length) = (1.0 / 40.0, 1.0);
             let strip = rectangle(cut, [length, wide as f64 * cell], [40, wide]);
-            let clamp = |[x, _, _]: [f64; 3]| x < -0.5 + 1.01 * cell;
-            let clamp = |p: [f64; 3]| if cut == Cut::Irregular { p[0] < -0.5 + 1.4 * cell } else { clamp(p) };
+            // Two columns, of which the second may be moved.
+            let clamped = if cut == Cut::Irregular { 1.4 } else { 1.01 } * cell;
+            let clamp = |[x, _, _]: [f64; 3]| x < -0.5 + clamped;
             let end = |[x, _, _]: [f64; 3]| x > 0.4999;
             let found = sag(&strip, 0.0, clamp, G as f32, &[], end);
             let free: f64 = length - cell / 2.0;

@@ -8,7 +8,7 @@
 use super::stencils::{Kept, Stencils};
 use crate::energy::stencil::StencilKind;
 use crate::math::{Mat3, Vec3};
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::Vector2;
 use std::collections::BTreeMap;
 
 /// A triangle of a sheet, before it is an element.
@@ -254,7 +254,7 @@ fn fit_quadratic(places: &[(u32, Vector2<f64>)]) -> (Vec<[f64; 3]>, f64) {
     // The corners of a triangle are among them.
     let fitted = PP.try_inverse().unwrap_or_else(Mat3::zeros) * PQ;
     let beyond: Vec<Vec3> = planes.iter().map(|p| quadratic(p) - fitted.tr_mul(p)).collect();
-    let gram: Matrix3<f64> = beyond.iter().fold(Mat3::zeros(), |sum, q| sum + q * q.transpose());
+    let gram: Mat3 = beyond.iter().fold(Mat3::zeros(), |sum, q| sum + q * q.transpose());
     let eigen = gram.symmetric_eigen();
     let inverse = eigen.eigenvalues.map(|l| if l > WEAK_FIT * WEAK_FIT { 1.0 / l } else { 0.0 });
     let inverse = eigen.eigenvectors * Mat3::from_diagonal(&inverse) * eigen.eigenvectors.transpose();

@@ -37,7 +37,7 @@ pub(super) struct Kept {
 }
 
 /// A bend at rest below this \[rad per element\] counts as none: it would have no direction to keep.
-pub(super) const STRAIGHT: f64 = 1.0e-9;
+const STRAIGHT: f64 = 1.0e-9;
 
 impl Stencils {
     pub fn iter(&self) -> impl ExactSizeIterator<Item = Stencil<'_>> + Clone {
