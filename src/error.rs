@@ -36,6 +36,14 @@ pub enum BodyError {
         /// Number of cavities of the body.
         cavities: usize,
     },
+    /// The body has no such rod.
+    #[error("rod {rod} does not exist: the body has {rods}")]
+    NoSuchRod {
+        /// The rod asked for.
+        rod: usize,
+        /// Number of rods of the body.
+        rods: usize,
+    },
     /// What no cavity can be filled with.
     #[error("the filling of cavity {cavity} cannot be: {what}")]
     BadFilling {

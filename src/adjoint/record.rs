@@ -103,6 +103,7 @@ fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
         (body.materials.iter().any(resists), "stiffness damping and Maxwell branches have none"),
         (body.materials.iter().any(|m| m.orthotropic.is_some()), "woven sheets have none"),
         (body.fillings.iter().any(Option::is_some), "filled cavities have none"),
+        (!body.state.twists.is_empty(), "rods that are held against roll have none"),
         (body.wind().is_some(), "wind has none"),
     ];
     why.iter().find(|(is_so, _)| *is_so).map_or(Ok(()), |(_, what)| Err(*what))

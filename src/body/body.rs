@@ -118,6 +118,7 @@ impl DeformableBody {
             history: History::default(),
             sleep: Sleep::default(),
             factor_base: FactorBase::default(),
+            twists: Vec::new(),
         };
         let mut body = Self {
             model,

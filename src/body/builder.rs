@@ -36,6 +36,7 @@ pub struct DeformableBodyBuilder {
     material: DeformableMaterial,
     pub(super) region_materials: Vec<(u32, DeformableMaterial)>,
     fillings: Vec<(usize, CavityFilling)>,
+    twists: Vec<(usize, f64)>,
     settings: SolverSettings,
     pub(super) pose: Pose,
     body_type: RigidBodyType,
@@ -147,6 +148,7 @@ impl DeformableBodyBuilder {
             material: DeformableMaterial::new(1.0e6, 0.3),
             region_materials: Vec::new(),
             fillings: Vec::new(),
+            twists: Vec::new(),
             settings: build.defaults(),
             pose: Pose::IDENTITY,
             body_type: RigidBodyType::Dynamic,
@@ -291,6 +293,13 @@ impl DeformableBodyBuilder {
         self
     }
 
+    /// Holds the ends of a rod against roll, as [`DeformableBody::hold_twist`]: `roll` \[rad\] beyond what its rest shape has. One that is not
+    /// there is an error of [`DeformableBodyBuilder::build`].
+    pub fn hold_twist(mut self, rod: usize, roll: f64) -> Self {
+        self.twists.push((rod, roll));
+        self
+    }
+
     /// Sets the factor on gravity.
     pub fn gravity_scale(mut self, scale: f64) -> Self {
         self.gravity_scale = scale;
@@ -373,6 +382,9 @@ impl DeformableBodyBuilder {
             .try_for_each(|region| body.check_warp(body.region_material(region), region))?;
         for (cavity, filling) in &self.fillings {
             body.fill_cavity(*cavity, Some(*filling))?;
+        }
+        for (rod, roll) in &self.twists {
+            body.hold_twist(*rod, *roll)?;
         }
         body.teleport(self.pose)?;
         body.set_body_type(self.body_type);

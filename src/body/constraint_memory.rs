@@ -22,6 +22,8 @@ pub(crate) enum ConstraintKey {
     Attachment(AttachmentAxis),
     /// Part of a cable.
     Cable(CableRow),
+    /// The torque of a twisted rod between rigid bodies.
+    Twist(RodEnds),
 }
 
 /// A contact of a deformable body with a collider.
@@ -144,6 +146,15 @@ pub(crate) struct CableRow {
     pub part: CablePart,
 }
 
+/// A rod of a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct RodEnds {
+    /// The body's handle, packed.
+    pub body: u64,
+    pub rod: u32,
+}
+
 /// Parts of a cable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde-serialize", derive(serde::Serialize, serde::Deserialize))]
@@ -171,12 +182,12 @@ impl ConstraintKey {
         matches!(self, Self::SoftPair(_))
     }
 
-    /// Whether it names a constraint that belongs to an island and not to one body: of rigid bodies, of an attachment or a cable.
+    /// Whether it names a constraint that belongs to an island and not to one body: of rigid bodies, of an attachment, a cable or a twisted rod.
     pub fn is_shared(&self) -> bool {
         match self {
             Self::Obstacle(_) | Self::SoftPair(_) => false,
             Self::RigidPair(_) | Self::Joint(_) | Self::MultibodyJoint(_) => true,
-            Self::Attachment(_) | Self::Cable(_) => true,
+            Self::Attachment(_) | Self::Cable(_) | Self::Twist(_) => true,
         }
     }
 }

@@ -28,6 +28,7 @@ mod pins;
 mod report;
 mod sleep;
 mod stress;
+mod twist;
 mod wind;
 
 mod builder;
@@ -52,7 +53,8 @@ pub(crate) use cable::{Guide, Winch};
 pub use constraint_memory::JointRole;
 pub(crate) use constraint_memory::{
     AttachmentAxis, AttachmentDirection, CablePart, CableRow, ConstraintGeometry, ConstraintKey,
-    ConstraintMemory, Feature, JointAxis, ObstacleContact, RigidPairContact, SoftPairContact, SoftPairKind,
+    ConstraintMemory, Feature, JointAxis, ObstacleContact, RigidPairContact, RodEnds, SoftPairContact,
+    SoftPairKind,
 };
 pub use contacts::{DeformableContact, DeformablePairContact};
 pub(crate) use factor_base::FactorBase;
@@ -66,4 +68,5 @@ pub use state::DeformableState;
 pub(crate) use state::{History, Sleep, Surroundings, is_number};
 pub use stress::DeformableStress;
 pub(crate) use touching::TouchKey;
+pub(crate) use twist::HeldEnd;
 pub use wind::DeformableWind;

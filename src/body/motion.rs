@@ -283,6 +283,7 @@ impl DeformableBody {
         }
         self.drive.linvel = pose.rotation * self.drive.linvel;
         self.drive.angvel = pose.rotation * self.drive.angvel;
+        self.turn_twists(&pose.rotation);
         self.state.contacts.clear();
         self.state.shared.clear();
         self.state.impacts.clear();

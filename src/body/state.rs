@@ -5,6 +5,7 @@ use super::contacts::{DeformableContact, DeformablePairContact};
 use super::factor_base::FactorBase;
 use super::handle::DeformableBodyHandle;
 use super::impact::{Impact, Partner};
+use super::twist::HeldTwist;
 use crate::fem::{Dampers, DeformableModel, are_dampers};
 use crate::math::{Pose64, Vec3};
 use rapier3d::dynamics::RigidBodyHandle;
@@ -33,6 +34,8 @@ pub struct DeformableState {
     pub(crate) history: History,
     pub(crate) sleep: Sleep,
     pub(crate) factor_base: FactorBase,
+    /// Rods that are held against roll, ascending.
+    pub(crate) twists: Vec<HeldTwist>,
 }
 
 /// The state before the last step; empty where no step can go on from it.
@@ -172,6 +175,9 @@ impl DeformableState {
         }
         if !are_dampers(&self.dampers, model) {
             return Err("its dampers are not those of its mesh");
+        }
+        if !self.are_twists(model) {
+            return Err("what holds its rods is not of its mesh");
         }
         self.factor_base.check(nodes)
     }

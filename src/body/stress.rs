@@ -181,6 +181,7 @@ impl DeformableBody {
         let mut force = vec![Vec3::zeros(); self.state.x.len()];
         let (undamped, frame) = (StiffnessDamping::default(), Mat3::identity());
         let at = Evaluation { damping: &undamped, x: &self.state.x, frame: &frame, limit: f64::INFINITY };
-        (add_forces(&self.elements(), &at, &mut force).energy, force)
+        let energy = add_forces(&self.elements(), &at, &mut force).energy;
+        (energy + self.add_twist_response(&mut force), force)
     }
 }

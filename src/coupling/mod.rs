@@ -28,6 +28,7 @@ mod speculative;
 mod actuators;
 mod attachments;
 mod cables;
+mod twists;
 
 mod reactions;
 
@@ -51,3 +52,4 @@ pub(crate) use parts::{RapierSets, StepContext, body_handle, collider_handle, im
 pub use query_colliders::DeformableColliders;
 pub(crate) use reactions::Reactions;
 pub(crate) use scene::RapierScene;
+pub(crate) use twists::{place_twists, twist_constraints};

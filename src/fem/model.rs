@@ -47,6 +47,8 @@ pub struct DeformableModel {
     pub(crate) surface: Surface,
     /// Closed rooms, the largest first.
     pub(crate) cavities: Vec<Cavity>,
+    /// Nodes along each rod.
+    pub(super) rods: Vec<Vec<u32>>,
     /// Extent of the rest shape: diagonal of its bounding box \[m\].
     pub(crate) size: f64,
     /// Volume at rest \[m³\].
@@ -187,6 +189,7 @@ impl DeformableModel {
             tetrahedra,
             node_volumes,
             cavities,
+            rods: structure.rods().map(|points| points.iter().map(|&v| node(v)).collect()).collect(),
             surface,
             node_of_vertex,
             vertex_of_node,
@@ -289,8 +292,13 @@ impl DeformableModel {
     }
 
     /// Nodes along each rod.
-    pub(crate) fn rods(&self) -> impl Iterator<Item = Vec<u32>> + '_ {
-        self.structure.rods().map(|points| points.iter().map(|&v| self.node_of_vertex[v as usize]).collect())
+    pub(crate) fn rods(&self) -> impl ExactSizeIterator<Item = &[u32]> + '_ {
+        self.rods.iter().map(|nodes| &nodes[..])
+    }
+
+    /// Number of rods.
+    pub fn rod_count(&self) -> usize {
+        self.rods.len()
     }
 
     /// Bytes of the constant data: mesh, gradients, surface, orders.

@@ -148,6 +148,16 @@ impl Structure {
         structure.with_rod((0..points.len() as u32).collect(), radius)
     }
 
+    /// The same, closed: from the last point back to the first.
+    ///
+    /// # Errors
+    /// As [`Structure::rod`].
+    pub fn ring(points: &[[f64; 3]], radius: f64) -> Result<Self, MeshError> {
+        check_finite(points)?;
+        let structure = Self { vertices: points.to_vec(), ..Self::default() };
+        structure.with_rod((0..points.len() as u32).chain([0]).collect(), radius)
+    }
+
     /// Adds triangles over the present vertices.
     ///
     /// # Errors
@@ -227,6 +237,10 @@ impl Structure {
     /// Rest positions \[m\], one per vertex.
     pub fn vertices(&self) -> &[[f64; 3]] {
         &self.vertices
+    }
+
+    pub(crate) fn rod_at(&self, rod: usize) -> &Rod {
+        &self.rods[rod]
     }
 
     /// Vertices along each rod.

@@ -67,7 +67,7 @@ impl DeformableSkin {
             let first = segments.len() as u32;
             let ends = nodes.windows(2).map(|ends| [ends[0], ends[1]]);
             segments.extend(ends.zip(&rest_frames).zip(first..).map(|((ends, frame), i)| (ends, i, *frame)));
-            skin.rods.extend(rest_frames.first().map(|frame| (nodes, *frame)));
+            skin.rods.extend(rest_frames.first().map(|frame| (nodes.to_vec(), *frame)));
         }
         let sheets = &model.surface.triangles[model.surface.closed..];
         let normals_at_rest = point_normals(sheets, &model.rest);

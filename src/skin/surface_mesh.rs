@@ -52,7 +52,7 @@ impl DeformableSurfaceMesh {
         draft.add_solids(model);
         draft.add_sheets(model);
         for nodes in model.rods() {
-            draft.add_tube(model, &nodes);
+            draft.add_tube(model, nodes);
         }
         (draft.mesh, draft.nodes)
     }

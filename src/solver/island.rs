@@ -246,13 +246,13 @@ impl Island {
         outcome
     }
 
-    /// Brings factors of bodies that make their own, and what their cavities resist, to where the iteration is.
+    /// Brings factors of bodies that make their own, and what their cavities and twisted rods resist, to where the iteration is.
     fn refresh(&mut self, context: &SolveContext<'_>) {
         let constraints = self.contacts.constraints();
         let mut changed = self.newton_factors.refresh(&mut self.bodies, context.factors, constraints);
         let own = Factors { cache: context.factors, newton: &self.newton_factors };
         for (index, body) in self.bodies.iter_mut().enumerate() {
-            changed |= body.refresh_cavities(own.of(index, body));
+            changed |= body.refresh_low_rank(own.of(index, body));
         }
         if changed {
             self.contacts.outdate(Change::Factors);

@@ -8,7 +8,7 @@ use crate::body::{ConstraintKey, DeformableAttachmentHandle, DeformableBodyHandl
 use crate::contact::{Constraint, Endpoint};
 use crate::coupling::{
     StepContext, SteppedBodies, WalkContext, attached_nodes, attachment_constraints, cable_constraints,
-    parted, prescribed_nodes,
+    parted, place_twists, prescribed_nodes, twist_constraints,
 };
 use crate::threads::for_each;
 use std::collections::HashMap;
@@ -54,6 +54,7 @@ impl StepScratch {
         prescribed_nodes(deformables, &mut self.scene, context, recovery, &mut self.prescribed);
         self.attached.clear();
         attached_nodes(deformables, &mut self.scene, context, &mut self.attached);
+        place_twists(deformables, &mut self.scene, context);
         self.parted.clear();
         parted(deformables, &mut self.scene, context, &mut self.parted);
         self.predict_from(0, deformables, context);
@@ -147,7 +148,7 @@ impl StepScratch {
             self.linking.len() + self.works.iter().map(|w| w.constraints.len()).sum::<usize>();
     }
 
-    /// Adds the constraints of attachments and cables.
+    /// Adds the constraints of attachments, cables and twisted rods.
     pub(super) fn attach(&mut self, deformables: &mut DeformableBodySet, context: &StepContext<'_>) {
         for work in &mut self.works {
             work.linked_nodes.clear();
@@ -156,6 +157,7 @@ impl StepScratch {
         let stepped = Stepped { works: &self.works, places: &self.places };
         attachment_constraints(deformables, &mut self.scene, context, &stepped, &mut self.linking);
         cable_constraints(deformables, &mut self.scene, context, &stepped, &mut self.linking);
+        twist_constraints(deformables, &mut self.scene, context, &stepped, &mut self.linking);
         // Between nodes that are prescribed and what does not yield there is nothing to solve for.
         let (works, proxies) = (&self.works, &self.scene.proxies);
         self.linking.retain(|constraint| {

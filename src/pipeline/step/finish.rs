@@ -110,6 +110,7 @@ pub(super) fn store(
     body.advance_pins(h);
     body.before.clone_from(&body.state.x);
     body.state.x.clone_from(&problem.current.x);
+    body.note_twists();
     let share = problem.pin_share();
     for pin in &mut body.pins {
         pin.force = problem.pin_force(pin.node, &share);

@@ -50,7 +50,7 @@ pub(super) fn list_rigid_forces(
                 continue;
             }
             ConstraintKey::Obstacle(_) | ConstraintKey::SoftPair(_) => continue,
-            ConstraintKey::Attachment(_) | ConstraintKey::Cable(_) => continue,
+            ConstraintKey::Attachment(_) | ConstraintKey::Cable(_) | ConstraintKey::Twist(_) => continue,
         };
         let along = force.dot(&constraint.frame[0]);
         // Upper limits are constraints along the reversed axis.

@@ -22,6 +22,7 @@ impl BodyProblem {
             mass_damping: 0.0,
             activations: body.activations.clone(),
             cavities: Vec::new(),
+            twists: Vec::new(),
             h,
             dt: h,
             reach: h,
@@ -108,6 +109,7 @@ impl BodyProblem {
         self.mass_damping = body.model.mass_damping(&body.materials);
         self.activations.clone_from(&body.activations);
         self.read_cavities(&body.fillings, &body.state.x);
+        self.read_twists(body);
         self.step_damping = self.scale;
         self.guard_retries = 0;
         self.is_rejected = false;

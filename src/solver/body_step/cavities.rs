@@ -42,11 +42,12 @@ impl BodyProblem {
         energy
     }
 
-    /// Lets the preconditioner know what the fillings resist where the iteration is; true if any does. A pressure at any volume
-    /// resists nothing: P and W stay.
-    pub fn refresh_cavities(&mut self, factor: &SystemFactor) -> bool {
+    /// Lets the preconditioner know what fillings and twisted rods resist where the iteration is; true if any does. A pressure at any
+    /// volume resists nothing: P and W stay.
+    pub fn refresh_low_rank(&mut self, factor: &SystemFactor) -> bool {
         let resists = |filled: &FilledCavity| !matches!(filled.filling, CavityFilling::Pressure { .. });
-        if self.preconditioner.is_rigid() || !self.cavities.iter().any(resists) {
+        let any = !self.twists.is_empty() || self.cavities.iter().any(resists);
+        if self.preconditioner.is_rigid() || !any {
             return false;
         }
         self.preconditioner.clear_low_rank();
@@ -63,6 +64,7 @@ impl BodyProblem {
             self.key.pins.iter().for_each(|&p| gradient[p as usize] = Vec3::zeros());
             self.preconditioner.add_low_rank(factor, &gradient, stiffness);
         }
+        self.add_twist_stiffness(factor, &mut gradient);
         self.force = gradient;
         true
     }

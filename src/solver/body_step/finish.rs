@@ -56,7 +56,7 @@ impl BodyProblem {
         if self.is_alpha() {
             return self.balance_momenta(v);
         }
-        if !self.settings.keeps_spin {
+        if !self.settings.keeps_spin || self.are_ends_held() {
             return;
         }
         if in_flight {

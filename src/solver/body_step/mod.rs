@@ -11,6 +11,7 @@ mod hard_limits;
 mod initial_guess;
 mod newton_factors;
 mod rigid_fallback;
+mod twists;
 mod xpbd;
 
 pub(crate) use generalized_alpha::alpha_step;

@@ -6,6 +6,7 @@
 
 use super::cavities::FilledCavity;
 use super::generalized_alpha::{ALPHA_F, AlphaStart};
+use super::twists::TwistSpring;
 use super::xpbd::XpbdState;
 use crate::body::{Impact, PrescribedNode, SolverSettings};
 use crate::fem::elastic_forces::Evaluation;
@@ -57,6 +58,7 @@ pub(crate) struct BodyProblem {
     pub(super) mass_damping: f64,
     pub(super) activations: Vec<f64>,
     pub(super) cavities: Vec<FilledCavity>,
+    pub(super) twists: Vec<TwistSpring>,
     /// The step that the objective is of \[s\], and that by which time goes on.
     pub(super) h: f64,
     pub(super) dt: f64,
@@ -123,7 +125,7 @@ pub(crate) struct Iterate {
     pub r: Vec<Vec3>,
     /// Ψ \[J\].
     pub objective: f64,
-    /// E, with the stiffness damping of the step, less the work of what fills cavities \[J\].
+    /// E, with the stiffness damping of the step and what twisted rods have gained, less the work of what fills cavities \[J\].
     pub elastic: f64,
     /// Least `tr(QᵀR)` of the elements against the body's frame.
     pub least_trace: f64,
@@ -290,7 +292,7 @@ impl BodyProblem {
         at.r.resize(at.x.len(), Vec3::zeros());
         let (model, materials, activations) = (&*self.model, &self.materials, &self.activations);
         let elements = Elements { model, materials, activations };
-        let filled = self.add_cavity_forces(at);
+        let filled = self.add_cavity_forces(at) + self.add_twist_forces(at);
         let limit = limit / self.scale - filled;
         let place = Evaluation { damping: &self.damping, x: &at.x, frame: &self.frame, limit };
         let time = &mut self.preconditioner.counters.element_time;
@@ -347,7 +349,8 @@ impl BodyProblem {
         }
         let promised = 0.1 * (by_contact + by_residual);
         // Ψ is a sum over the elements: its rounding is below 1e-13 of its terms.
-        let rounding = 1e-12 * (self.trial.objective.abs() + self.current.objective.abs() + by_contact.abs());
+        let sums = self.trial.objective.abs() + self.current.objective.abs() + by_contact.abs();
+        let rounding = 1e-12 * sums + self.twist_rounding();
         self.trial.objective - by_contact <= self.current.objective - promised + rounding
     }
 

@@ -14,6 +14,8 @@ struct Multipliers {
     elements: ElementMultipliers,
     /// \[Pa\] of the filled rooms.
     pressures: Vec<f64>,
+    /// \[N·m\] of the twisted rods.
+    torques: Vec<f64>,
     /// Contact forces \[N\] that the positions have in them.
     felt: Vec<Vec3>,
 }
@@ -43,10 +45,12 @@ impl BodyProblem {
     /// Starts where the body goes without forces between its nodes.
     pub(super) fn begin_xpbd(&mut self) {
         let mut xpbd = std::mem::take(&mut self.xpbd);
-        let Multipliers { elements, pressures, felt } = &mut xpbd.current;
+        let Multipliers { elements, pressures, torques, felt } = &mut xpbd.current;
         elements.begin(&self.elements());
         pressures.clear();
         pressures.resize(self.cavities.len(), 0.0);
+        torques.clear();
+        torques.resize(self.twists.len(), 0.0);
         felt.clear();
         felt.resize(self.masses.len(), Vec3::zeros());
         let (inertia, drag) = self.inertia_and_drag();
@@ -80,6 +84,8 @@ impl BodyProblem {
         let mut gradient = std::mem::take(&mut self.force);
         gradient.resize(x.len(), Vec3::zeros());
         self.sweep_cavities(&mut xpbd, &mut gradient, &mut x);
+        let XpbdState { trial, elastic_mobility, .. } = &mut xpbd;
+        self.sweep_twists(&mut trial.torques, elastic_mobility, &mut gradient, &mut x);
         (self.trial.x, self.force, self.xpbd) = (x, gradient, xpbd);
         self.preconditioner.counters.element_time += clock.lap();
     }
@@ -93,7 +99,8 @@ impl BodyProblem {
         let of = |filled: &FilledCavity| {
             filled.filling.work(filled.start, self.model.cavities[filled.cavity].volume(&self.current.x))
         };
-        self.xpbd.current.elements.energy(&self.elements()) - self.cavities.iter().map(of).sum::<f64>()
+        let filled = self.cavities.iter().map(of).sum::<f64>();
+        self.xpbd.current.elements.energy(&self.elements()) - filled + self.energy_of_twists()
     }
 
     /// Residuals by what multipliers push, at pinned nodes minus the forces of the pins \[N\], where strains that are not answered would
@@ -107,6 +114,7 @@ impl BodyProblem {
         for (filled, pressure) in self.cavities.iter().zip(&self.xpbd.current.pressures) {
             self.model.cavities[filled.cavity].add_gradient(&self.current.x, *pressure, &mut residuals);
         }
+        self.add_torques(&self.xpbd.current.torques, &mut residuals);
         let (_, drag) = self.inertia_and_drag();
         for (i, r) in residuals.iter_mut().enumerate() {
             *r = *r * self.scale - (self.current.x[i] - self.x_start[i]) * (drag * self.masses[i]);
