@@ -34,7 +34,7 @@ fn tag(text: &str) -> Option<&str> {
     let names = text[..year].strip_suffix(' ')?;
     let is_name = |c: char| c.is_alphabetic() || [' ', '.', '&', '-', '’'].contains(&c);
     let end = text[year..].find(|c: char| !c.is_ascii_digit()).map_or(text.len(), |n| year + n);
-    let is_year = end - year == 4 && ["19", "20"].iter().any(|c| text[year..].starts_with(c));
+    let is_year = end - year == 4 && ["18", "19", "20"].iter().any(|c| text[year..].starts_with(c));
     let follows = text[end..].chars().next();
     let is_tag = names.starts_with(char::is_uppercase) && names.chars().all(is_name) && is_year;
     (is_tag && matches!(follows, None | Some(','))).then_some(&text[..end])

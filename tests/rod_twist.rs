@@ -2,31 +2,10 @@
 
 mod common;
 
+use common::rods::{INERTIA, STIFFNESS, aside, clamped, pendulum, straight, world};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 use std::f64::consts::PI;
-
-const RADIUS: f64 = 0.01;
-
-/// Along x, `n` segments, without Poisson's ratio: EI = GJ.
-fn straight(length: f64, n: usize) -> Vec<[f64; 3]> {
-    (0..=n).map(|k| [length * k as f64 / n as f64, 0.0, 0.0]).collect()
-}
-
-fn clamped(length: f64, n: usize, modulus: f64) -> DeformableBodyBuilder {
-    let edge = length / n as f64;
-    let near = move |x: f64| x < 1.01 * edge || x > length - 1.01 * edge;
-    let material = DeformableMaterial::new(modulus, 0.0).mass_damping(2.0);
-    let rod = DeformableBodyBuilder::structure(&Structure::rod(&straight(length, n), RADIUS).unwrap());
-    rod.material(material).pinned(move |x| near(x.x.into())).gravity_scale(0.0).can_sleep(false).tune(|s| s.tolerance = 1.0e-10)
-}
-
-fn world() -> (PhysicsWorld, DeformableWorld) {
-    let mut physics = PhysicsWorld::new();
-    physics.gravity = Vector::ZERO;
-    physics.integration_parameters.dt = 1.0 / 100.0;
-    (physics, DeformableWorld::new())
-}
 
 /// How far from its axis \[m\] a clamped rod of 1 m ends that is a millimetre off at first, and twisted by `share` of what buckles
 /// it [Greenhill 1883].
@@ -43,11 +22,6 @@ fn sideways(share: f64, n: usize) -> f64 {
         deformables.step(&mut physics);
     }
     aside(&deformables.bodies[rod])
-}
-
-/// How far a rod along x is from its axis at the most \[m\].
-fn aside(body: &DeformableBody) -> f64 {
-    body.positions().map(|x| f64::from(x.y).hypot(x.z.into())).fold(0.0, f64::max)
 }
 
 #[test]
@@ -99,51 +73,6 @@ fn rings_buckle_at_michells_twist() {
     }
 }
 
-/// A disc on the end of a wire that hangs from the world.
-struct Pendulum {
-    physics: PhysicsWorld,
-    deformables: DeformableWorld,
-    wire: DeformableBodyHandle,
-    disc: RigidBodyHandle,
-}
-
-/// A wire of half a metre and 2 mm, 0.4 N·m/rad·m of GJ, and a disc of 1 kg: 2.5e-3 kg m² about the wire.
-const STIFFNESS: f64 = 0.8;
-const INERTIA: f64 = 2.5e-3;
-
-fn pendulum(dt: f32, solver: Solver) -> Pendulum {
-    let (mut physics, mut deformables) = world();
-    physics.integration_parameters.dt = dt;
-    physics.gravity = Vector::new(0.0, -9.81, 0.0);
-    let points: Vec<[f64; 3]> = (0..=10).map(|k| [0.0, 0.5 - 0.05 * f64::from(k), 0.0]).collect();
-    let radius = 2.0e-3_f64;
-    // GJ/l of it.
-    let modulus = STIFFNESS * 0.5 * 2.0 / (0.5 * PI * radius.powi(4));
-    let wire = DeformableBodyBuilder::structure(&Structure::rod(&points, radius).unwrap()).can_sleep(false);
-    let wire = wire.material(DeformableMaterial::new(modulus, 0.0)).pinned(|x| x.y > 0.44).hold_twist(0, 0.0);
-    let wire = deformables.insert(wire.tune(|s| s.solver = solver)).unwrap();
-    let disc = RigidBodyBuilder::dynamic().can_sleep(false).additional_mass_properties(MassProperties::new(
-        Vector::ZERO,
-        1.0,
-        Vector::new(1.3e-3, INERTIA as f32, 1.3e-3),
-    ));
-    let disc = physics.insert_body(disc);
-    let to = AttachTo::RigidBody(disc, *physics.bodies[disc].position());
-    deformables.bodies.attach(wire, &[9, 10], to).unwrap();
-    Pendulum { physics, deformables, wire, disc }
-}
-
-impl Pendulum {
-    fn step(&mut self) {
-        self.deformables.step(&mut self.physics);
-    }
-
-    /// How far the disc is turned about the wire, whole turns and all, from the wire's top.
-    fn turned(&self) -> f64 {
-        self.deformables.bodies[self.wire].twist(0).unwrap().unwrap()
-    }
-}
-
 #[test]
 fn torsion_pendulums_swing_by_their_period() {
     let period = 2.0 * PI * (INERTIA / STIFFNESS).sqrt();
@@ -164,7 +93,9 @@ fn torsion_pendulums_swing_by_their_period() {
         let measured = 2.0 * (crossings[crossings.len() - 1] - crossings[0]) / (crossings.len() - 1) as f64;
         // Started at 20 rad/s: that over its frequency, less what implicit Euler takes in a quarter of a period.
         let swing = 20.0 * period / (2.0 * PI);
-        println!("{solver:?}: a period of {measured:.5} s ({period:.5}), swings by {most:.3} rad ({swing:.3})");
+        println!(
+            "{solver:?}: a period of {measured:.5} s ({period:.5}), swings by {most:.3} rad ({swing:.3})"
+        );
         assert!((measured / period - 1.0).abs() < 2.0e-3, "{measured} {period}");
         assert!((most / swing - 1.0).abs() < 0.03, "{most} {swing}");
     }
@@ -185,4 +116,53 @@ fn discs_hang_where_their_torque_leaves_them() {
         assert!((turned.abs() - 6.0 / STIFFNESS).abs() < 1.0e-3 * 6.0 / STIFFNESS, "{turned}");
         assert!((torque.abs() - 6.0).abs() < 6.0e-3, "{torque}");
     }
+}
+
+/// Two discs that spin against one another on the ends of a rod, in flight: what one gains the other loses.
+#[test]
+fn discs_on_a_shaft_keep_their_angular_momentum() {
+    let (mut physics, mut deformables) = world();
+    let points: Vec<[f64; 3]> = (0..=6).map(|k| [0.1 * f64::from(k), 0.0, 0.0]).collect();
+    let shaft = Structure::rod(&points, 0.01).unwrap();
+    let material = DeformableMaterial::new(1.0e7, 0.3).density(1000.0);
+    let shaft =
+        DeformableBodyBuilder::structure(&shaft).material(material).can_sleep(false).hold_twist(0, 0.0);
+    let shaft = deformables.insert(shaft).unwrap();
+    let inertia = [2.0e-3_f32, 5.0e-4];
+    let mut discs = Vec::new();
+    for (k, spin) in [(0, 3.0), (1, -1.0)] {
+        let mass = MassProperties::new(Vector::ZERO, 1.0, Vector::splat(inertia[k]));
+        let disc = RigidBodyBuilder::dynamic().translation(Vector::new(0.6 * k as f32, 0.0, 0.0));
+        let disc = physics.insert_body(disc.can_sleep(false).additional_mass_properties(mass));
+        physics.bodies[disc].set_angvel(Vector::new(spin, 0.0, 0.0), true);
+        let to = AttachTo::RigidBody(disc, *physics.bodies[disc].position());
+        deformables.bodies.attach(shaft, &[[0, 1], [5, 6]][k], to).unwrap();
+        discs.push(disc);
+    }
+    // Rapier's own rounding turns a free disc faster and faster.
+    let free = RigidBodyBuilder::dynamic().translation(Vector::Y).can_sleep(false);
+    let mass = MassProperties::new(Vector::ZERO, 1.0, Vector::splat(inertia[0]));
+    let free = physics.insert_body(free.additional_mass_properties(mass));
+    physics.bodies[free].set_angvel(Vector::new(3.0, 0.0, 0.0), true);
+    let spin =
+        |physics: &PhysicsWorld| -> [f64; 2] { [0, 1].map(|k| physics.bodies[discs[k]].angvel().x.into()) };
+    let total = |spin: [f64; 2]| spin[0] * f64::from(inertia[0]) + spin[1] * f64::from(inertia[1]);
+    let (start, mut least, mut most) = (total(spin(&physics)), f64::INFINITY, 0.0_f64);
+    let mut drift = (0.0_f64, 0.0);
+    for _ in 0..500 {
+        deformables.step(&mut physics);
+        let now = spin(&physics);
+        least = least.min(now[1]);
+        most = most.max(now[1]);
+        drift = (
+            drift.0.max((total(now) / start - 1.0).abs()),
+            f64::from(physics.bodies[free].angvel().x) / 3.0 - 1.0,
+        );
+    }
+    let end = spin(&physics);
+    println!("angular momentum off by {:.1e}, of a free disc by {:.1e}", drift.0, drift.1);
+    println!("the light disc between {least:.2} and {most:.2} rad/s, both at last {end:.3?}");
+    assert!((drift.0 - drift.1).abs() < 5.0e-5, "{drift:?}");
+    // It has swung up, and implicit Euler has stilled it: both turn as one.
+    assert!(most > 4.0 && (end[0] - end[1]).abs() < 0.05, "{most} {end:?}");
 }

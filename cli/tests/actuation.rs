@@ -117,3 +117,22 @@ fn woven_sheets_stretch_by_the_modulus_of_their_direction() {
     let run = foible_cli::run::run(&common::scene(&bad), &Default::default());
     assert!(run.outcome.error.unwrap().contains("without a direction of the warp"));
 }
+
+/// A rope that a signal winds up, beyond what buckles it.
+#[test]
+fn ropes_are_twisted_by_signals() {
+    let run = outcome(
+        r#"
+        world = { duration = 3.0, dt = 0.01, gravity = [0, 0, 0] }
+        deformable = [{ name = "cord", body = { rope = { points = [[0, 0, 0], [1, 0.001, 0], [2, 0, 0]], segments = 20, radius = 0.02 } }, pinned = [{ min = [-1, -1, -1], max = [0.11, 1, 1] }, { min = [1.89, -1, -1], max = [3, 1, 1] }], material = { youngs_modulus = 1e7, poisson_ratio = 0, density = 1000, mass_damping = 5 } }]
+        actuator = [{ name = "chuck", drives = "twist", of = "cord", range = [0, 20], rate = 20, then = [{ at = 0.0, value = 12.0 }] }]
+        measure = [{ name = "before", quantity = "energy", of = "cord", at = 0.25 }, { name = "after", quantity = "energy", of = "cord" }, { name = "roll", quantity = "signal", of = "chuck" }]
+        "#,
+    );
+    // GJ/l φ²/2 at 5 rad, straight; at 12 some of it has gone into the bend.
+    let straight = |roll: f64| 0.5 * 5e6 * std::f64::consts::FRAC_PI_2 * 0.02f64.powi(4) / 2.0 * roll * roll;
+    let of = |name: &str| number(&run, name);
+    assert_eq!(of("roll"), 12.0);
+    assert!((of("before") / straight(5.0) - 1.0).abs() < 0.02, "{} {}", of("before"), straight(5.0));
+    assert!((0.8..1.0).contains(&(of("after") / straight(12.0))), "{} {}", of("after"), straight(12.0));
+}

@@ -1,7 +1,8 @@
-//! Deformable bodies of a world: what fills their closed rooms.
+//! Deformable bodies of a world: what fills their closed rooms, and what twists their rods.
 
 use crate::arrays::{Array1, Array2, rows};
 use crate::deformable::PyDeformableBody;
+use crate::errors::Failure;
 use foible3d::{BodyError, CavityFilling, DeformableBody};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -61,5 +62,31 @@ impl PyDeformableBody {
     /// Opens a cavity: nothing is in it but what is around the body.
     fn empty_cavity(&self, py: Python<'_>, cavity: usize) -> PyResult<()> {
         self.try_with(py, |body| body.fill_cavity(cavity, None))
+    }
+
+    /// Holds both ends of a rod against roll: from now on it resists twist. `roll` [rad] is how far its last end is rolled against
+    /// the first, right-handed about the rod, beyond how both are when it is held first. An end whose vertex is attached to a rigid
+    /// body rolls with it, and the torque acts on that body; others are held in the world.
+    #[pyo3(signature = (roll, rod = 0))]
+    fn hold_twist(&self, py: Python<'_>, roll: f64, rod: usize) -> PyResult<()> {
+        self.try_with(py, |body| body.hold_twist(rod, roll))
+    }
+
+    /// Lets the ends of a rod roll freely; its twist is gone.
+    #[pyo3(signature = (rod = 0))]
+    fn release_twist(&self, py: Python<'_>, rod: usize) -> PyResult<()> {
+        self.try_with(py, |body| body.release_twist(rod))
+    }
+
+    /// By how much a rod is twisted from end to end [rad]; ``None`` if its ends are not held.
+    #[pyo3(signature = (rod = 0))]
+    fn twist(&self, py: Python<'_>, rod: usize) -> PyResult<Option<f64>> {
+        self.read(py, |body| body.twist(rod).map_err(Failure::from))?.map_err(PyErr::from)
+    }
+
+    /// Torque along a twisted rod [N·m]; zero if its ends are not held.
+    #[pyo3(signature = (rod = 0))]
+    fn twist_torque(&self, py: Python<'_>, rod: usize) -> PyResult<f64> {
+        self.read(py, |body| body.twist_torque(rod).map_err(Failure::from))?.map_err(PyErr::from)
     }
 }

@@ -63,6 +63,13 @@ impl PyActuator {
         Self(Actuator::CavityPressure(body.0, cavity))
     }
 
+    /// How far the last end of a rod is rolled against its first [rad], as ``DeformableBody.hold_twist`` has it.
+    #[staticmethod]
+    #[pyo3(signature = (body, rod = 0))]
+    fn twist(body: PyDeformableHandle, rod: usize) -> Self {
+        Self(Actuator::Twist(body.0, rod))
+    }
+
     /// Tension of a cable [N].
     #[staticmethod]
     fn cable_tension(cable: PyCableHandle) -> Self {
@@ -102,6 +109,7 @@ impl PyActuator {
     fn __repr__(&self) -> String {
         let kind = match self.0 {
             Actuator::CavityPressure(..) => "cavity_pressure",
+            Actuator::Twist(..) => "twist",
             Actuator::CableTension(_) => "cable_tension",
             Actuator::CableLength(_) => "cable_length",
             Actuator::Activation(_) => "activation",

@@ -35,8 +35,8 @@ pub struct DeformableBodyBuilder {
     pub(super) model: Result<Arc<DeformableModel>, MeshError>,
     material: DeformableMaterial,
     pub(super) region_materials: Vec<(u32, DeformableMaterial)>,
-    fillings: Vec<(usize, CavityFilling)>,
-    twists: Vec<(usize, f64)>,
+    pub(super) fillings: Vec<(usize, CavityFilling)>,
+    pub(super) twists: Vec<(usize, f64)>,
     settings: SolverSettings,
     pub(super) pose: Pose,
     body_type: RigidBodyType,
@@ -283,20 +283,6 @@ impl DeformableBodyBuilder {
     /// Pins the vertices whose initial position in the world satisfies a condition.
     pub fn pinned(mut self, condition: impl Fn(Vector) -> bool + Send + Sync + 'static) -> Self {
         self.pinned = Some(Arc::new(condition));
-        self
-    }
-
-    /// Fills a cavity, by its place among [`DeformableModel::cavities`]: [`DeformableBody::fill_cavity`]. One that is not there is
-    /// an error of [`DeformableBodyBuilder::build`].
-    pub fn fill_cavity(mut self, cavity: usize, filling: CavityFilling) -> Self {
-        self.fillings.push((cavity, filling));
-        self
-    }
-
-    /// Holds the ends of a rod against roll, as [`DeformableBody::hold_twist`]: `roll` \[rad\] beyond what its rest shape has. One that is not
-    /// there is an error of [`DeformableBodyBuilder::build`].
-    pub fn hold_twist(mut self, rod: usize, roll: f64) -> Self {
-        self.twists.push((rod, roll));
         self
     }
 

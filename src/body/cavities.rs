@@ -1,6 +1,7 @@
 //! What fills the closed rooms of a body, and what is read of them.
 
 use super::body::DeformableBody;
+use super::builder::DeformableBodyBuilder;
 use crate::energy::CavityFilling;
 use crate::error::BodyError;
 
@@ -86,5 +87,14 @@ impl DeformableBody {
     fn check_cavity(&self, cavity: usize) -> Result<(), BodyError> {
         let cavities = self.model.cavities.len();
         if cavity < cavities { Ok(()) } else { Err(BodyError::NoSuchCavity { cavity, cavities }) }
+    }
+}
+
+impl DeformableBodyBuilder {
+    /// Fills a cavity, by its place among [`DeformableModel::cavities`]: [`DeformableBody::fill_cavity`]. One that is not there is
+    /// an error of [`DeformableBodyBuilder::build`].
+    pub fn fill_cavity(mut self, cavity: usize, filling: CavityFilling) -> Self {
+        self.fillings.push((cavity, filling));
+        self
     }
 }

@@ -1,6 +1,7 @@
 //! Rods whose ends are held against roll: how far they are twisted, and the torque of that.
 
 use super::body::{DeformableBody, in_range};
+use super::builder::DeformableBodyBuilder;
 use super::state::DeformableState;
 use crate::error::BodyError;
 use crate::fem::{DeformableModel, EndFrame, TwistedRod};
@@ -153,6 +154,15 @@ impl DeformableBody {
                 end.frame = end.placed;
             }
         }
+    }
+}
+
+impl DeformableBodyBuilder {
+    /// Holds the ends of a rod against roll, as [`DeformableBody::hold_twist`]: `roll` \[rad\] beyond what its rest shape has. One that is not
+    /// there is an error of [`DeformableBodyBuilder::build`].
+    pub fn hold_twist(mut self, rod: usize, roll: f64) -> Self {
+        self.twists.push((rod, roll));
+        self
     }
 }
 

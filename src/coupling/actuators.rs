@@ -16,6 +16,8 @@ use std::collections::BTreeMap;
 pub enum Actuator {
     /// Pressure in a cavity above that around the body \[Pa\], as [`CavityFilling::Pressure`].
     CavityPressure(DeformableBodyHandle, usize),
+    /// How far the last end of a rod is rolled against its first \[rad\], as [`DeformableBody::hold_twist`](crate::DeformableBody::hold_twist) has it.
+    Twist(DeformableBodyHandle, usize),
     /// Tension of a cable \[N\].
     CableTension(DeformableCableHandle),
     /// Length of a cable without tension \[m\].
@@ -234,6 +236,7 @@ impl Actuator {
                 let filling = CavityFilling::Pressure { gauge: value };
                 bodies.get_mut(body)?.fill_cavity(cavity, Some(filling)).ok()
             }
+            Self::Twist(body, rod) => bodies.get_mut(body)?.hold_twist(rod, value).ok(),
             Self::CableTension(cable) => bodies.cable_mut(cable)?.set_tension(value).ok(),
             Self::CableLength(cable) => bodies.cable_mut(cable)?.set_length(value).ok(),
             Self::Activation(body) => bodies.get_mut(body)?.set_activation(value).ok(),

@@ -4,11 +4,9 @@
 use super::attachments::SteppedBodies;
 use super::parts::StepContext;
 use super::scene::RapierScene;
-use crate::body::{
-    ConstraintKey, DeformableBody, DeformableBodyHandle, DeformableBodySet, HeldEnd, RodEnds,
-};
+use crate::body::{ConstraintKey, DeformableBody, DeformableBodyHandle, DeformableBodySet, HeldEnd, RodEnds};
 use crate::contact::{Constraint, Endpoint, Law, PathPoint};
-use crate::math::{Mat3, Pose64, Vec3, from_real, rotation_from_vector};
+use crate::math::{Mat3, Pose64, from_real, rotation_from_vector};
 use rapier3d::dynamics::RigidBodyHandle;
 
 /// Places the frames of held rods for a step: those on rigid bodies go with these, to where they will be at its end; and tells how far rods
@@ -37,7 +35,9 @@ pub(crate) fn place_twists(
         body.note_twists();
         turn_ends(body, |rigid| match led_turn(rigid, scene, context) {
             Some(_) => None,
-            None => Some(rotation_from_vector(&(from_real(context.sets.bodies.get(rigid)?.angvel()) * context.h))),
+            None => {
+                Some(rotation_from_vector(&(from_real(context.sets.bodies.get(rigid)?.angvel()) * context.h)))
+            }
         });
     }
 }
@@ -87,8 +87,8 @@ pub(crate) fn twist_constraints(
     stepped: &impl SteppedBodies,
     constraints: &mut Vec<Constraint>,
 ) {
-    for (handle, body) in deformables.iter().filter(|(_, body)| !body.state.twists.is_empty()) {
-        let Some(place) = stepped.place_of(handle) else { continue };
+    let is_stepped = |handle| stepped.place_of(handle).is_some();
+    for (handle, body) in deformables.iter().filter(|(handle, _)| is_stepped(*handle)) {
         for held in &body.state.twists {
             let mut path = Vec::new();
             for (end, sign) in held.ends.iter().zip([-1.0, 1.0]) {
@@ -101,10 +101,8 @@ pub(crate) fn twist_constraints(
             if path.is_empty() {
                 continue;
             }
-            // Its own body is in the solve, and feels nothing of it: it has the twist as its own.
-            let node = body.model.rod(held.rod as usize)[0];
-            path.push(PathPoint { endpoint: Endpoint::node(place, node), direction: Vec3::zeros() });
-            let key = ConstraintKey::Twist(RodEnds { body: super::packed(handle.into_raw_parts()), rod: held.rod });
+            let key =
+                ConstraintKey::Twist(RodEnds { body: super::packed(handle.into_raw_parts()), rod: held.rod });
             let gap = held.roll + held.angle;
             let mut torque = Constraint::along(path, scene.world_proxy(), gap, Law::BILATERAL, key);
             torque.compliance = 1.0 / body.model.torsional_stiffness(held.rod as usize, &body.materials);

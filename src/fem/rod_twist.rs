@@ -168,7 +168,8 @@ mod tests {
                 let [a, b, c, d] = [x[i], x[(i + 1) % n], x[j], x[(j + 1) % n]];
                 let [ac, ad, bc, bd] = [c - a, d - a, c - b, d - b];
                 let sides = [ac.cross(&ad), ad.cross(&bd), bd.cross(&bc), bc.cross(&ac)];
-                let Some(sides) = sides.map(|s| s.try_normalize(1e-14)).into_iter().collect::<Option<Vec<_>>>()
+                let Some(sides) =
+                    sides.map(|s| s.try_normalize(1e-14)).into_iter().collect::<Option<Vec<_>>>()
                 else {
                     continue;
                 };

@@ -7,6 +7,7 @@ pub mod cavities;
 pub mod games;
 pub mod joints;
 pub mod newton;
+pub mod rods;
 pub mod soft_bodies;
 pub mod thin;
 

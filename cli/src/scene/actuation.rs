@@ -51,6 +51,8 @@ pub enum Drives {
     Length,
     /// Pressure in a cavity of a deformable, above that around it \[Pa\].
     Pressure,
+    /// How far the last end of a rope is rolled against its first \[rad\].
+    Twist,
     /// Stretch that the muscle fibres of a deformable want to have.
     Activation,
     /// Position of the motor of a joint \[m\] or \[rad\].

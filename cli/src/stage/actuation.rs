@@ -64,6 +64,7 @@ impl Stage {
             Drives::Tension => Some(Actuator::CableTension(cable()?)),
             Drives::Length => Some(Actuator::CableLength(cable()?)),
             Drives::Pressure => Some(Actuator::CavityPressure(body()?, entry.cavity)),
+            Drives::Twist => Some(Actuator::Twist(body()?, 0)),
             Drives::Activation => Some(Actuator::Activation(body()?)),
             Drives::Position | Drives::Velocity => {
                 let pair = entry.between.as_ref()?;
