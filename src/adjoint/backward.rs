@@ -61,6 +61,7 @@ impl<'a> Backward<'a> {
             pin_targets: users(&of_pins),
             gravity: of.gravity.into(),
             activation,
+            pressures: self.tangent.rooms.of_pressures(model.cavities.len(), &z),
             velocities: users(&of.v_start),
         });
         (self.x, self.v) = (of.x_start, of.v_start);
@@ -87,7 +88,7 @@ impl<'a> Backward<'a> {
         }
         let elements =
             Elements { model: self.model, materials: &record.materials, activations: &record.activations };
-        if !self.tangent.update(&elements, &record.x_end, &fixed, record.h) {
+        if !self.tangent.update(&elements, &record.fillings, &record.x_end, &fixed, record.h) {
             return Err("its stiffness has no inverse");
         }
         let mut z_stuck = vec![Vec3::zeros(); g.len()];

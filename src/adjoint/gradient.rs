@@ -28,6 +28,8 @@ pub struct StepGradient {
     pub gravity: [f64; 3],
     /// Of the stretch that muscle fibres wanted to have.
     pub activation: f64,
+    /// Per pascal more in each filled cavity, in the order of [`DeformableModel::cavities`](crate::DeformableModel::cavities); zero of empty ones.
+    pub pressures: Vec<f64>,
     /// Per m/s that each vertex would have gained before the step.
     pub velocities: Vec<[f64; 3]>,
 }
@@ -68,6 +70,12 @@ impl DeformableGradient {
     /// Of an activation that was the same in all steps.
     pub fn activation(&self) -> f64 {
         self.steps.iter().map(|step| step.activation).sum()
+    }
+
+    /// Per pascal more in each cavity in all steps.
+    pub fn pressures(&self) -> Vec<f64> {
+        let cavities = self.steps.first().map_or(0, |step| step.pressures.len());
+        (0..cavities).map(|cavity| self.steps.iter().map(|step| step.pressures[cavity]).sum()).collect()
     }
 
     /// Per newton on each vertex of a force that was the same in all steps.

@@ -4,6 +4,7 @@
 
 mod checkpoint;
 mod contact_rows;
+mod filled_rooms;
 mod gradient;
 mod loss;
 mod parameters;

@@ -1,6 +1,8 @@
 //! Solves with the Hessian of a step where it has ended: its Cholesky factor, or, where it is not definite, GMRES with the factor of
-//! what is left without its negative part [Saad & Schultz 1986].
+//! what is left without its negative part [Saad & Schultz 1986]; and what filled cavities resist, one direction each.
 
+use super::filled_rooms::FilledRooms;
+use crate::energy::CavityFilling;
 use crate::fem::{DeformableModel, Elements, SystemMatrix};
 use crate::math::{Mat3, Vec3};
 use crate::solver::linear::{
@@ -20,22 +22,37 @@ pub(super) struct Tangent {
     values: Option<Vec<f64>>,
     /// Its elastic blocks in the rows of pinned nodes.
     beside: Vec<(usize, usize, Mat3)>,
+    pins: Vec<u32>,
+    pub rooms: FilledRooms,
 }
 
 impl Tangent {
     pub fn new(model: &DeformableModel) -> Option<Self> {
         let symbolic = pattern_of(model, SystemMatrix::RestStiffness)?;
-        let (scratch, beside) = (FactorScratch::default(), Vec::new());
-        Some(Self { symbolic, scratch, factor: None, values: None, beside })
+        let (scratch, rooms) = (FactorScratch::default(), FilledRooms::default());
+        let (beside, pins) = (Vec::new(), Vec::new());
+        Some(Self { symbolic, scratch, factor: None, values: None, beside, pins, rooms })
     }
 
-    /// Makes it of a step of `h` \[s\] that has ended at `x`; false if that cannot be.
-    pub fn update(&mut self, elements: &Elements<'_>, x: &[Vec3], pins: &[u32], h: f64) -> bool {
+    /// Makes it of a step of `h` \[s\] that has ended at `x`, with cavities filled so; false if that cannot be.
+    pub fn update(
+        &mut self,
+        elements: &Elements<'_>,
+        fillings: &[Option<CavityFilling>],
+        x: &[Vec3],
+        pins: &[u32],
+        h: f64,
+    ) -> bool {
         self.beside.clear();
-        let (symbolic, beside) = (&self.symbolic, &mut self.beside);
-        let values = assemble_tangent_beside(elements, x, false, pins, h, symbolic, |i, j, block| {
-            beside.push((i, j, *block));
-        });
+        self.pins.clear();
+        self.pins.extend_from_slice(pins);
+        self.rooms.read(elements.model, fillings, x);
+        let (symbolic, beside, rooms) = (&self.symbolic, &mut self.beside, &self.rooms);
+        let pressed = |add: &mut dyn FnMut(usize, usize, &Mat3)| rooms.add_pressed(elements.model, x, add);
+        let values =
+            assemble_tangent_beside(elements, x, false, pins, h, symbolic, pressed, |i, j, block| {
+                beside.push((i, j, *block));
+            });
         self.values = None;
         self.factor = symbolic.factorize(&values, &mut self.scratch).ok();
         if self.factor.is_none() {
@@ -43,11 +60,25 @@ impl Tangent {
             self.factor = symbolic.factorize(&projected, &mut self.scratch).ok();
             self.values = Some(values);
         }
-        self.factor.is_some()
+        self.factor.is_some() && self.find_responses()
+    }
+
+    /// Finds how the rooms answer to one another.
+    fn find_responses(&mut self) -> bool {
+        let mut responses = self.rooms.pushes(&self.pins);
+        let is_solved = self.solve_without_rooms(&mut responses);
+        self.rooms.set_responses(responses);
+        is_solved
     }
 
     /// Solves `H z = b` in place for columns of three numbers a node, zero at pinned ones; false if that fails.
     pub fn solve(&mut self, columns: &mut [f64]) -> bool {
+        let is_solved = self.solve_without_rooms(columns);
+        let n = self.symbolic.column_starts().len() - 1;
+        is_solved && columns.chunks_exact_mut(n).all(|column| self.rooms.take_off(column))
+    }
+
+    fn solve_without_rooms(&mut self, columns: &mut [f64]) -> bool {
         let Some(factor) = &self.factor else { return false };
         let Some(values) = &self.values else {
             self.symbolic.solve_batch(factor, columns, &mut self.scratch);
@@ -65,12 +96,14 @@ impl Tangent {
     /// Takes `K z` off what acts on pinned nodes.
     pub fn take_off_pinned(&self, z: &[Vec3], out: &mut [Vec3]) {
         self.beside.iter().for_each(|(i, j, block)| out[*i] -= block * z[*j]);
+        self.rooms.resist(z, |node| self.pins.binary_search(&(node as u32)).is_ok(), out);
     }
 
     /// Takes `K z`, z of pinned nodes, off what acts on free ones.
     pub fn take_off_free(&self, z: &[Vec3], is_free: &[bool], out: &mut [Vec3]) {
         let to_free = self.beside.iter().filter(|(i, j, _)| is_free[*j] && z[*i] != Vec3::zeros());
         to_free.for_each(|(i, j, block)| out[*j] -= block.tr_mul(&z[*i]));
+        self.rooms.resist(z, |node| is_free[node], out);
     }
 }
 
@@ -165,7 +198,7 @@ mod tests {
             // Squeezed along its length it would buckle.
             let x: Vec<Vec3> = model.rest.iter().map(|X| Vec3::new(X.x * squeeze, X.y, X.z)).collect();
             let mut tangent = Tangent::new(&model).unwrap();
-            assert!(tangent.update(&elements, &x, &pins, 1.0));
+            assert!(tangent.update(&elements, &[], &x, &pins, 1.0));
             assert_eq!(tangent.values.is_none(), is_definite);
             let symbolic = &tangent.symbolic;
             let values = assemble_tangent(&elements, &x, false, &pins, 1.0, symbolic);

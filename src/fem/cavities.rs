@@ -1,6 +1,6 @@
 //! Closed rooms of a body: hollows within its tetrahedra, and what its sheets close in.
 
-use crate::math::{Vec3, solid_angle};
+use crate::math::{Mat3, Vec3, skew, solid_angle};
 use crate::mesh::{NONE, Surface};
 use std::collections::HashMap;
 
@@ -55,6 +55,22 @@ impl Cavity {
             let [a, b, c] = nodes.map(|n| x[n as usize] - origin);
             for (n, by) in nodes.iter().zip([b.cross(&c), c.cross(&a), a.cross(&b)]) {
                 out[*n as usize] += by * (scale / 6.0);
+            }
+        }
+    }
+}
+
+impl Cavity {
+    /// Calls `f` with the second derivative of the volume by the positions of two nodes \[m\], the larger first, for every edge of the
+    /// walls twice, from either side.
+    pub fn second_derivatives(&self, x: &[Vec3], mut f: impl FnMut(usize, usize, Mat3)) {
+        let origin = self.triangles.first().map_or(Vec3::zeros(), |t| x[t[0] as usize]);
+        for nodes in &self.triangles {
+            let [a, b, c] = nodes.map(|n| n as usize);
+            for (from, to, across) in [(a, b, c), (b, c, a), (c, a, b)] {
+                // Skew: what it is the other way round, it is transposed.
+                let sign = if from > to { -6.0 } else { 6.0 };
+                f(from.max(to), from.min(to), skew(&(x[across] - origin)) / sign);
             }
         }
     }
@@ -142,6 +158,7 @@ mod tests {
     use super::*;
     use crate::fem::DeformableModel;
     use crate::mesh::{Structure, TetMesh};
+    use std::ops::AddAssign;
 
     /// A lattice of 5 × 3 × 3 cells without some of them.
     fn hollow(without: &[[usize; 3]]) -> DeformableModel {
@@ -210,6 +227,29 @@ mod tests {
                 let slope = (moved(1e-4) - moved(-1e-4)) / 2e-4;
                 // Linear in one coordinate: 1e-16 of 50 m times an area over the step.
                 assert!((slope - gradient[i][c]).abs() < 1e-9, "{slope} {}", gradient[i][c]);
+            }
+        }
+        // Of the gradient, by nodes in a row.
+        let mut second = nalgebra::DMatrix::<f64>::zeros(3 * x.len(), 3 * x.len());
+        cavity.second_derivatives(&x, |i, j, block| {
+            second.view_mut((3 * i, 3 * j), (3, 3)).add_assign(&block);
+            second.view_mut((3 * j, 3 * i), (3, 3)).add_assign(&block.transpose());
+        });
+        let at = |by: f64, node: usize, axis: usize| {
+            let mut y = x.clone();
+            y[node][axis] += by;
+            let mut gradient = vec![Vec3::zeros(); y.len()];
+            cavity.add_gradient(&y, 1.0, &mut gradient);
+            gradient
+        };
+        for node in (0..x.len()).step_by(5) {
+            for axis in 0..3 {
+                let [ahead, behind] = [at(1e-3, node, axis), at(-1e-3, node, axis)];
+                for (k, (a, b)) in ahead.iter().zip(&behind).enumerate() {
+                    let column = second.fixed_view::<3, 1>(3 * k, 3 * node + axis);
+                    // Linear again: rounding over the step.
+                    assert!(((a - b) / 2e-3 - column).norm() < 1e-10, "{k} {node}");
+                }
             }
         }
         let force: Vec3 = gradient.iter().sum();

@@ -19,6 +19,8 @@ pub struct Run {
     /// Velocity of the pins along z [m/s].
     pub lead: f64,
     pub activation: f64,
+    /// What fills the first cavity.
+    pub filling: Option<CavityFilling>,
     /// Of the floor; none if there is no friction.
     pub friction: f64,
 }
@@ -34,6 +36,7 @@ impl Run {
             launch: [0.0; 2],
             lead: 0.25,
             activation: 1.0,
+            filling: None,
             friction: 0.0,
         }
     }
@@ -62,6 +65,9 @@ pub struct Outcome {
     pub tip: usize,
     pub h: f64,
     pub contact_force: [f64; 3],
+    /// Of the first cavity at the end of each step \[m³\].
+    pub volumes: Vec<f64>,
+    pub filling: Option<CavityFilling>,
     pub floor: Option<ColliderHandle>,
 }
 
@@ -109,14 +115,18 @@ impl Scene {
         }
         body.add_force(&[tip], Vector::Z * run.push as f32).unwrap();
         body.set_activation(run.activation).unwrap();
+        if run.filling.is_some() {
+            body.fill_cavity(0, run.filling).unwrap();
+        }
         for vertex in body.pinned().collect::<Vec<_>>() {
             body.set_velocity(vertex, Vector::ZERO).unwrap();
             body.set_pin_velocity(vertex, Vector::Z * run.lead as f32).unwrap();
         }
         let mut tape = DeformableTape::new(&world, handle).unwrap();
-        let mut losses = Vec::new();
+        let (mut losses, mut volumes) = (Vec::new(), Vec::new());
         for step in 0..self.steps {
             tape.step(&mut physics, &mut world).unwrap();
+            volumes.extend(world.bodies[handle].cavity_volume(0));
             if step + 1 == self.steps || step + 1 == self.steps / 2 {
                 let body = &world.bodies[handle];
                 let at = |v: usize| (body.position(v).unwrap(), body.velocity(v).unwrap());
@@ -138,7 +148,7 @@ impl Scene {
         }
         let contact_force = floor.map_or([0.0; 3], |floor| tape.contact_force(self.look, floor));
         let h = f64::from(physics.integration_parameters.dt);
-        Outcome { loss, tape, seeds, tip, h, contact_force, floor }
+        Outcome { loss, tape, seeds, tip, h, contact_force, volumes, filling: run.filling, floor }
     }
 }
 

@@ -160,10 +160,11 @@ pub(crate) fn assemble_tangent(
     h: f64,
     symbolic: &Symbolic,
 ) -> Vec<f64> {
-    assemble_tangent_beside(elements, x, projected, pins, h, symbolic, |_, _, _| ())
+    assemble_tangent_beside(elements, x, projected, pins, h, symbolic, |_| (), |_, _, _| ())
 }
 
-/// As [`assemble_tangent`], with `beside(i, j, K)` for every block of an element in the row of a pinned node i.
+/// As [`assemble_tangent`], with the blocks that `more` adds for pairs of nodes of a triangle, and with `beside(i, j, K)` for every
+/// block of these and of elements in the row of a pinned node i.
 pub(crate) fn assemble_tangent_beside(
     elements: &Elements<'_>,
     x: &[Vec3],
@@ -171,12 +172,13 @@ pub(crate) fn assemble_tangent_beside(
     pins: &[u32],
     h: f64,
     symbolic: &Symbolic,
+    more: impl FnOnce(&mut dyn FnMut(usize, usize, &Mat3)),
     mut beside: impl FnMut(usize, usize, &Mat3),
 ) -> Vec<f64> {
     let Elements { model, materials, .. } = elements;
     let mut matrix = Upper::new(model, materials, pins, SystemMatrix::RestStiffness, h, symbolic);
     let stiffening = |material: &DeformableMaterial| material.stiffening(h);
-    add_tangents(elements, x, projected, stiffening, |i, j, block| {
+    let mut add = |i: usize, j: usize, block: &Mat3| {
         if matrix.pinned[i] {
             beside(i, j, block);
         }
@@ -184,7 +186,9 @@ pub(crate) fn assemble_tangent_beside(
             beside(j, i, &block.transpose());
         }
         matrix.add_elastic(i, j, block);
-    });
+    };
+    add_tangents(elements, x, projected, stiffening, &mut add);
+    more(&mut add);
     matrix.values
 }
 
