@@ -12,6 +12,7 @@
 //! | `wind`, `queries`, `recording` | air, rays, files |
 //! | `tactile`, `depth_camera`, `wrench` | touch, as sensors report it |
 //! | `actuators`, `signals` | what drives a world, by name |
+//! | `tape` | gradients over steps |
 
 mod actuators;
 mod arrays;
@@ -50,6 +51,7 @@ mod sets;
 mod signals;
 mod snapshots;
 mod tactile;
+mod tape;
 mod wind;
 mod world;
 mod wrench;
@@ -113,6 +115,8 @@ mod native {
     use crate::signals::{PyActuator, PyMotorAxis};
     #[pymodule_export]
     use crate::tactile::{PyTactilePad, PyTactileReading};
+    #[pymodule_export]
+    use crate::tape::{PyGradient, PyTape};
     #[pymodule_export]
     use crate::world::World;
 

@@ -22,7 +22,7 @@ def test_a_cord_is_twisted_and_its_torque_turns_a_disc():
     world.attach(handle, [9, 10], disc)
     world.step(10)
     # The cord turns it back.
-    assert world.bodies[disc].angvel[0] < -0.1 and cord.twist() < 4 * np.pi
+    assert world.rigid_bodies[disc].angvel[0] < -0.1 and cord.twist() < 4 * np.pi
     again = f.World.restore(world.snapshot())
     assert again.deformable_bodies[handle].twist() == cord.twist()
     world.actuators.insert("chuck", f.Actuator.twist(handle), (0, 10), start=1.0)

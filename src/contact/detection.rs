@@ -192,24 +192,16 @@ impl Detector {
                 continue;
             }
             let to_local = |v: &Vec3| scene.obstacle.start.rotation.tr_mul(v);
-            let outward = if surface.is_thin[s] {
-                side_of_node(
-                    scene.obstacle,
-                    nodes[s],
-                    &p,
-                    &to_local(&self.motions[s]),
-                    memory,
-                    scene.scales.band,
-                )
-            } else {
-                to_local(&self.normals[s])
+            let outward = || {
+                let motion = to_local(&self.motions[s]);
+                let side = || side_of_node(scene.obstacle, nodes[s], &p, &motion, memory, scene.scales.band);
+                if surface.is_thin[s] { side() } else { to_local(&self.normals[s]) }
             };
-            let is_solid_on_sheet = !surface.is_thin[s] && scene.obstacle.solidity() == Solidity::Sheet;
-            let carried =
-                is_solid_on_sheet.then(|| against_carried(scene.obstacle, nodes[s], memory)).flatten();
+            let is_sheet = scene.obstacle.solidity() == Solidity::Sheet;
+            let carried = is_sheet.then(|| against_carried(scene.obstacle, nodes[s], memory)).flatten();
             self.nodes[s] = match carried {
                 Some(outward) => carried_point(scene.obstacle, &p, &outward, &scene.scales),
-                None => surface_point(scene.obstacle, &p, &outward, &scene.scales),
+                None => surface_point(scene.obstacle, &p, &outward(), &scene.scales),
             };
             self.found.push(s as u32);
             if let Some(found) = self.nodes[s].filter(|f| f.gap < reach) {

@@ -1,0 +1,249 @@
+//! Gradients over steps.
+
+use crate::arrays::{Array1, Array2, Triple, count, grid, points, rows, triple};
+use crate::errors::{Failure, bad_value, without_panic};
+use crate::handles::{PyColliderHandle, PyDeformableHandle};
+use crate::world::{World, in_turns};
+use foible3d::{DeformableGradient, DeformableTape, MaterialGradient, StepGradient};
+use numpy::{PyArray1, PyArray3};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Steps of one body of a world, recorded so that the derivatives of a loss with respect to what the body is made of, how it began and
+/// what acted on it can be had: exact ones of the converged steps, contact included.
+///
+/// Steps have to be solved far: a ``tolerance`` of 1e-10 or less and ``max_iterations`` enough, as ``Fidelity.REFERENCE`` has them. What has no
+/// gradient is refused when it is recorded, with the reason: `docs/limits.md` lists it. Every step is kept until ``clear``.
+#[pyclass(frozen, name = "Tape", module = "foible3d")]
+pub struct PyTape {
+    world: Py<World>,
+    tape: Mutex<DeformableTape>,
+    vertices: usize,
+}
+
+impl PyTape {
+    fn lock(&self) -> MutexGuard<'_, DeformableTape> {
+        self.tape.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A step by Python's numbers: from the end if negative.
+    fn place(&self, step: isize) -> PyResult<usize> {
+        let steps = self.lock().len();
+        let place = if step < 0 { steps.checked_add_signed(step) } else { Some(step as usize) };
+        place
+            .filter(|place| *place < steps)
+            .ok_or_else(|| bad_value(format!("step {step} is not among the {steps} of the tape")))
+    }
+
+    /// Rows of derivatives by steps.
+    fn by_step(
+        &self,
+        given: Option<BTreeMap<isize, Bound<'_, PyAny>>>,
+        name: &str,
+    ) -> PyResult<Vec<(usize, Vec<[f64; 3]>)>> {
+        let mut found = Vec::new();
+        for (step, rows) in given.unwrap_or_default() {
+            let rows = points(&rows, name)?;
+            if rows.len() != self.vertices {
+                let (rows, vertices) = (rows.len(), self.vertices);
+                return Err(bad_value(format!(
+                    "{name} of step {step} has {rows} rows, but the body {vertices} vertices"
+                )));
+            }
+            found.push((self.place(step)?, rows));
+        }
+        Ok(found)
+    }
+}
+
+#[pymethods]
+impl PyTape {
+    /// An empty tape of a body of a world.
+    #[new]
+    fn new(py: Python<'_>, world: Py<World>, body: PyDeformableHandle) -> PyResult<Self> {
+        let made = world.get().with(py, |inner| {
+            let tape = DeformableTape::new(&inner.deformables, body.0).map_err(Failure::from)?;
+            Ok::<_, Failure>((tape, inner.deformables.bodies[body.0].vertex_count()))
+        })?;
+        let (tape, vertices) = made?;
+        Ok(Self { world, tape: Mutex::new(tape), vertices })
+    }
+
+    /// Steps the world `n` times and records the steps. A step that has no gradient raises `DeformableBodyError`: the world has taken it.
+    #[pyo3(signature = (n = 1))]
+    fn step(&self, py: Python<'_>, n: i64) -> PyResult<()> {
+        in_turns(py, count("n", n)?, |n| {
+            let taken = self.world.get().detached(py, |inner| {
+                let mut tape = self.lock();
+                (0..n).try_for_each(|_| {
+                    inner.step(1);
+                    tape.record(&inner.physics, &inner.deformables).map_err(Failure::from)
+                })
+            })?;
+            Ok(taken?)
+        })
+    }
+
+    /// Number of steps.
+    fn __len__(&self) -> usize {
+        self.lock().len()
+    }
+
+    /// Forgets the steps.
+    fn clear(&self) {
+        self.lock().clear();
+    }
+
+    /// Force of a collider on the body in a step [N], an array of shape (3,), in the solver's precision.
+    fn contact_force<'py>(
+        &self,
+        py: Python<'py>,
+        step: isize,
+        collider: PyColliderHandle,
+    ) -> PyResult<Array1<'py>> {
+        let place = self.place(step)?;
+        let force = self.lock().contact_force(place, collider.0);
+        Ok(triple(py, force))
+    }
+
+    /// The derivatives of a loss, given by its own with respect to what it looks at: `positions` [1/m] and `velocities` [s/m] of the vertices at the
+    /// end of steps, dicts of arrays of shape (n, 3) by the number of the step, from the end if negative; `contact_forces` [1/N], a dict of
+    /// three numbers by pairs of a step and the handle of a collider.
+    #[pyo3(signature = (positions = None, velocities = None, contact_forces = None))]
+    fn backward(
+        &self,
+        py: Python<'_>,
+        positions: Option<BTreeMap<isize, Bound<'_, PyAny>>>,
+        velocities: Option<BTreeMap<isize, Bound<'_, PyAny>>>,
+        contact_forces: Option<HashMap<(isize, PyColliderHandle), Triple>>,
+    ) -> PyResult<PyGradient> {
+        let (positions, velocities) =
+            (self.by_step(positions, "positions")?, self.by_step(velocities, "velocities")?);
+        let forces = contact_forces.unwrap_or_default().into_iter();
+        let forces = forces.map(|((step, collider), of)| Ok((self.place(step)?, collider.0, of.0)));
+        let forces = forces.collect::<PyResult<Vec<_>>>()?;
+        let gradient = py.detach(|| {
+            without_panic(|| {
+                let tape = self.lock();
+                let mut loss = tape.loss();
+                for (step, rows) in &positions {
+                    each(rows, |vertex, row| loss.add_position(*step, vertex, row))?;
+                }
+                for (step, rows) in &velocities {
+                    each(rows, |vertex, row| loss.add_velocity(*step, vertex, row))?;
+                }
+                for (step, collider, of) in &forces {
+                    loss.add_contact_force(*step, *collider, *of)?;
+                }
+                tape.backward(&loss).map_err(Failure::from)
+            })
+        })?;
+        Ok(PyGradient(gradient?))
+    }
+}
+
+/// Adds rows that say anything to a loss.
+fn each(
+    rows: &[[f64; 3]],
+    mut add: impl FnMut(usize, [f64; 3]) -> Result<(), foible3d::BodyError>,
+) -> Result<(), Failure> {
+    let mut said = rows.iter().enumerate().filter(|(_, row)| **row != [0.0; 3]);
+    said.try_for_each(|(vertex, row)| add(vertex, *row)).map_err(Failure::from)
+}
+
+/// Derivatives of a loss, of ``Tape.backward``. Arrays are copies; those by steps have the steps first.
+#[pyclass(frozen, name = "Gradient", module = "foible3d")]
+pub struct PyGradient(DeformableGradient);
+
+impl PyGradient {
+    fn by_step<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&StepGradient) -> &[[f64; 3]],
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let flat: Vec<[f64; 3]> = self.0.steps.iter().flat_map(|step| of(step).iter().copied()).collect();
+        grid(py, [self.0.steps.len(), self.0.initial_positions.len()], &flat)
+    }
+
+    fn by_region<'py>(&self, py: Python<'py>, of: impl Fn(&MaterialGradient) -> f64) -> Array1<'py> {
+        PyArray1::from_vec(py, self.0.materials.iter().map(of).collect())
+    }
+}
+
+#[pymethods]
+impl PyGradient {
+    /// Per metre of where each vertex began, an array of shape (n, 3), with pins led to where they were.
+    #[getter]
+    fn initial_positions<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
+        rows(py, self.0.initial_positions.clone())
+    }
+
+    /// Per m/s with which each vertex began, an array of shape (n, 3).
+    #[getter]
+    fn initial_velocities<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
+        rows(py, self.0.initial_velocities.clone())
+    }
+
+    /// Of the coefficients of friction of all contacts together.
+    #[getter]
+    fn friction(&self) -> f64 {
+        self.0.friction
+    }
+
+    /// With respect to the materials of the regions, in the order of ``DeformableBody.regions``: arrays of shape (k,) by the names of ``Material``.
+    #[getter]
+    fn materials<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let found = PyDict::new(py);
+        found.set_item("youngs_modulus", self.by_region(py, |m| m.youngs_modulus))?;
+        found.set_item("poisson_ratio", self.by_region(py, |m| m.poisson_ratio))?;
+        found.set_item("density", self.by_region(py, |m| m.density))?;
+        found.set_item("mass_damping", self.by_region(py, |m| m.mass_damping))?;
+        found.set_item("fibre_modulus", self.by_region(py, |m| m.fibre_modulus))?;
+        Ok(found)
+    }
+
+    /// Per newton on each vertex in each step, an array of shape (steps, n, 3).
+    #[getter]
+    fn forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        self.by_step(py, |step| &step.forces)
+    }
+
+    /// Per metre of where each pinned vertex was led to in each step, an array of shape (steps, n, 3); zero of others.
+    #[getter]
+    fn pin_targets<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        self.by_step(py, |step| &step.pin_targets)
+    }
+
+    /// Per m/s that each vertex would have gained before each step, an array of shape (steps, n, 3).
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        self.by_step(py, |step| &step.velocities)
+    }
+
+    /// Per m/s² of the world's gravity in each step, an array of shape (steps, 3).
+    #[getter]
+    fn gravity<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
+        rows(py, self.0.steps.iter().map(|step| step.gravity).collect())
+    }
+
+    /// Of the stretch that muscle fibres wanted to have in each step, an array of shape (steps,).
+    #[getter]
+    fn activation<'py>(&self, py: Python<'py>) -> Array1<'py> {
+        PyArray1::from_vec(py, self.0.steps.iter().map(|step| step.activation).collect())
+    }
+
+    /// Per pascal more in each filled cavity in each step, an array of shape (steps, k); zero of empty ones.
+    #[getter]
+    fn pressures<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
+        let cavities = self.0.steps.first().map_or(0, |step| step.pressures.len());
+        let flat = self.0.steps.iter().flat_map(|step| step.pressures.iter().copied()).collect();
+        crate::arrays::image(py, [self.0.steps.len(), cavities], flat)
+    }
+
+    fn __repr__(&self) -> String {
+        let (steps, vertices) = (self.0.steps.len(), self.0.initial_positions.len());
+        format!("<Gradient of {steps} steps of {vertices} vertices>")
+    }
+}

@@ -1,0 +1,92 @@
+"""Gradients over steps, against differences between whole runs."""
+
+import numpy as np
+import pytest
+
+import foible3d as f
+
+STEPS = 20
+
+
+def swing(modulus=1e5, density=1000.0, push=0.5, pressure=None, friction=0.0, floor=None, start=0.0):
+    """A bar that is held at one end, or lies on a floor; with the tape of it."""
+    world = f.World()
+    material = f.Material(modulus, 0.3, density=density, mass_damping=1.0, friction=0.0)
+    options = dict(material=material, fidelity=f.Fidelity.REFERENCE, can_sleep=False, tolerance=1e-12, contact_tolerance=1e-12)
+    handle = world.add_deformable(f.DeformableBody.cuboid((0.25, 0.0625, 0.0625), (4, 1, 1), max_iterations=400, **options))
+    body = world.deformable_bodies[handle]
+    collider = None
+    if floor is None:
+        body.pin(body.positions[:, 0] < -0.249)
+    else:
+        ground = world.add_body(
+            f.RigidBody.fixed(translation=(0, floor - 1, 0)),
+            [f.Collider.cuboid(5, 1, 5, friction=friction, friction_combine_rule=f.CoefficientCombineRule.MAX)],
+        )
+        (collider,) = world.rigid_bodies[ground].colliders
+    tip = int(body.positions[:, 0].argmax())
+    velocities = body.velocities
+    velocities[tip, 1] += start
+    body.velocities = velocities
+    body.add_force((0, 0, push), [tip])
+    tape = f.Tape(world, handle)
+    return world, body, tape, tip, collider
+
+
+def test_gradients_are_those_of_differences():
+    def loss(**changed):
+        _, body, tape, tip, _ = swing(**changed)
+        tape.step(STEPS)
+        return body.positions[tip, 2] + 0.1 * body.velocities[tip, 1], body, tape, tip
+
+    _, body, tape, tip = loss()
+    assert len(tape) == STEPS
+    of_positions, of_velocities = np.zeros((2, body.vertex_count, 3))
+    of_positions[tip, 2], of_velocities[tip, 1] = 1.0, 0.1
+    gradient = tape.backward(positions={-1: of_positions}, velocities={STEPS - 1: of_velocities})
+    ours = {
+        "modulus": gradient.materials["youngs_modulus"].sum(),
+        "density": gradient.materials["density"].sum(),
+        "push": gradient.forces[:, tip, 2].sum(),
+        "start": gradient.initial_velocities[tip, 1],
+    }
+    for name, at, by in [("modulus", 1e5, 64.0), ("density", 1000.0, 1.0), ("push", 0.5, 2**-7), ("start", 0.0, 2**-7)]:
+        slope = (loss(**{name: at + by})[0] - loss(**{name: at - by})[0]) / (2 * by)
+        # Central differences: the square of the change.
+        assert ours[name] == pytest.approx(slope, rel=1e-4), name
+    assert gradient.gravity.shape == (STEPS, 3) and gradient.activation.shape == (STEPS,)
+    assert gradient.forces.shape == gradient.velocities.shape == (STEPS, body.vertex_count, 3)
+    assert gradient.pressures.shape == (STEPS, 0) and gradient.initial_positions.shape == (body.vertex_count, 3)
+    # Pins moved alike take the whole of a bar with them, by and by.
+    assert np.abs(gradient.pin_targets[:, tip]).max() == 0.0 < np.abs(gradient.pin_targets).max()
+    assert "20 steps" in repr(gradient)
+
+
+def test_contact_forces_have_gradients():
+    def force(density):
+        _, _, tape, _, collider = swing(density=density, floor=-0.0625, push=0.0, friction=1.0)
+        tape.step(8)
+        return tape.contact_force(-1, collider), tape, collider
+
+    found, tape, collider = force(1000.0)
+    gradient = tape.backward(contact_forces={(-1, collider): (0.0, 1.0, 0.0)})
+    slope = (force(1001.0)[0][1] - force(999.0)[0][1]) / 2
+    assert found[1] > 10.0 and gradient.materials["density"].sum() == pytest.approx(slope, rel=1e-4)
+    assert isinstance(gradient.friction, float)
+
+
+def test_what_has_no_gradient_is_refused():
+    world, body, tape, _, _ = swing()
+    tape.step(3)
+    seed = np.zeros((body.vertex_count, 3))
+    for bad, text in [({3: seed}, "step 3 is not among the 3"), ({-4: seed}, "step -4"), ({0: seed[:-1]}, "rows, but the body")]:
+        with pytest.raises(f.DeformableBodyError, match=text):
+            tape.backward(positions=bad)
+    body.set_wind((0, 0, 3.0))
+    with pytest.raises(f.DeformableBodyError, match="wind has none"):
+        tape.step()
+    tape.clear()
+    assert len(tape) == 0
+    other = f.World()
+    with pytest.raises(f.InvalidHandle):
+        f.Tape(other, body.handle)
