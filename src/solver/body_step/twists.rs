@@ -20,7 +20,7 @@ pub(crate) struct TwistSpring {
     /// \[rad\]
     roll: f64,
     /// Torque per twist [N·m/rad].
-    pub stiffness: f64,
+    stiffness: f64,
     /// Angle between the frames where the step begins \[rad\]: the nearest is meant, and energy is counted from there, so that it stays as
     /// small as what changes.
     start: f64,
