@@ -1,6 +1,6 @@
 //! Gradients over steps.
 
-use crate::arrays::{Array1, Array2, Triple, count, grid, points, rows, triple};
+use crate::arrays::{Array1, Array2, Triple, count, grid, image, points, rows, triple};
 use crate::errors::{Failure, bad_value, without_panic};
 use crate::handles::{PyColliderHandle, PyDeformableHandle};
 use crate::world::{World, in_turns};
@@ -167,6 +167,12 @@ impl PyGradient {
         grid(py, [self.0.steps.len(), self.0.initial_positions.len()], &flat)
     }
 
+    fn table<'py>(&self, py: Python<'py>, of: impl Fn(&StepGradient) -> &[f64]) -> PyResult<Array2<'py>> {
+        let columns = self.0.steps.first().map_or(0, |step| of(step).len());
+        let flat = self.0.steps.iter().flat_map(|step| of(step).iter().copied()).collect();
+        image(py, [self.0.steps.len(), columns], flat)
+    }
+
     fn by_region<'py>(&self, py: Python<'py>, of: impl Fn(&MaterialGradient) -> f64) -> Array1<'py> {
         PyArray1::from_vec(py, self.0.materials.iter().map(of).collect())
     }
@@ -237,9 +243,13 @@ impl PyGradient {
     /// Per pascal more in each filled cavity in each step, an array of shape (steps, k); zero of empty ones.
     #[getter]
     fn pressures<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
-        let cavities = self.0.steps.first().map_or(0, |step| step.pressures.len());
-        let flat = self.0.steps.iter().flat_map(|step| step.pressures.iter().copied()).collect();
-        crate::arrays::image(py, [self.0.steps.len(), cavities], flat)
+        self.table(py, |step| &step.pressures)
+    }
+
+    /// Per radian more of roll of each rod that was held against it in each step, an array of shape (steps, k); zero of others.
+    #[getter]
+    fn rolls<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
+        self.table(py, |step| &step.rolls)
     }
 
     fn __repr__(&self) -> String {

@@ -56,7 +56,7 @@ def test_gradients_are_those_of_differences():
         assert ours[name] == pytest.approx(slope, rel=1e-4), name
     assert gradient.gravity.shape == (STEPS, 3) and gradient.activation.shape == (STEPS,)
     assert gradient.forces.shape == gradient.velocities.shape == (STEPS, body.vertex_count, 3)
-    assert gradient.pressures.shape == (STEPS, 0) and gradient.initial_positions.shape == (body.vertex_count, 3)
+    assert gradient.pressures.shape == gradient.rolls.shape == (STEPS, 0) and gradient.initial_positions.shape == (body.vertex_count, 3)
     # Pins moved alike take the whole of a bar with them, by and by.
     assert np.abs(gradient.pin_targets[:, tip]).max() == 0.0 < np.abs(gradient.pin_targets).max()
     assert "20 steps" in repr(gradient)

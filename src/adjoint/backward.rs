@@ -4,12 +4,13 @@
 //! `H = −∂r/∂x′`, the adjoint z, q of section 14 of docs/method.md gives `dL/dθ = z·∂F₁/∂θ + q·∂F₂/∂θ`.
 
 use super::contact_rows::ContactRows;
+use super::filled_rooms::of_pressures;
 use super::gradient::{DeformableGradient, StepGradient};
 use super::parameters::{ElasticWork, Inertia};
 use super::record::{ContactRecord, StepRecord};
 use super::spin::{Cotangents, through_spin};
 use super::tangent::Tangent;
-use crate::fem::{DeformableModel, Elements};
+use crate::fem::DeformableModel;
 use crate::math::Vec3;
 
 /// What goes backward over the steps.
@@ -61,7 +62,8 @@ impl<'a> Backward<'a> {
             pin_targets: users(&of_pins),
             gravity: of.gravity.into(),
             activation,
-            pressures: self.tangent.rooms.of_pressures(model.cavities.len(), &z),
+            pressures: of_pressures(&self.tangent.rooms, model.cavities.len(), &z),
+            rolls: of_rolls(model, record, &z),
             velocities: users(&of.v_start),
         });
         (self.x, self.v) = (of.x_start, of.v_start);
@@ -86,9 +88,7 @@ impl<'a> Backward<'a> {
             is_free[node as usize] = false;
             of_fixed[node as usize] = std::mem::take(&mut g[node as usize]);
         }
-        let elements =
-            Elements { model: self.model, materials: &record.materials, activations: &record.activations };
-        if !self.tangent.update(&elements, &record.fillings, &record.x_end, &fixed, record.h) {
+        if !self.tangent.update(self.model, record, &fixed) {
             return Err("its stiffness has no inverse");
         }
         let mut z_stuck = vec![Vec3::zeros(); g.len()];
@@ -117,6 +117,15 @@ impl<'a> Backward<'a> {
         of.friction = share.of_friction;
         Ok((z, of_pins))
     }
+}
+
+/// What z says of the roll of each rod of a model.
+fn of_rolls(model: &DeformableModel, record: &StepRecord, z: &[Vec3]) -> Vec<f64> {
+    let mut of = vec![0.0; model.rod_count()];
+    for twist in &record.twists {
+        of[twist.rod] = twist.of_roll(model, &record.materials, &record.x_end, z);
+    }
+    of
 }
 
 /// Nodes that stick with the only contact they have, and all other contacts.

@@ -30,6 +30,8 @@ pub struct StepGradient {
     pub activation: f64,
     /// Per pascal more in each filled cavity, in the order of [`DeformableModel::cavities`](crate::DeformableModel::cavities); zero of empty ones.
     pub pressures: Vec<f64>,
+    /// Per radian more of roll of each rod that was held against it ([`DeformableBody::hold_twist`](crate::DeformableBody::hold_twist)); zero of others.
+    pub rolls: Vec<f64>,
     /// Per m/s that each vertex would have gained before the step.
     pub velocities: Vec<[f64; 3]>,
 }

@@ -4,8 +4,10 @@
 
 mod checkpoint;
 mod contact_rows;
+mod directions;
 mod filled_rooms;
 mod gradient;
+mod held_twists;
 mod loss;
 mod parameters;
 mod record;

@@ -38,6 +38,9 @@ impl ElasticWork<'_> {
         let x = &self.record.x_end;
         let at = Evaluation { damping: &damping, x, frame: &frame, limit: f64::INFINITY };
         add_forces(&elements, &at, self.force);
+        for twist in &self.record.twists {
+            twist.add_forces(self.model, materials, x, self.force);
+        }
         dot(self.force, self.z)
     }
 

@@ -1,6 +1,7 @@
 //! What is kept of a step so that it can be gone through backward, and which steps cannot be.
 
-use crate::body::{ConstraintKey, DeformableBody, Integrator, Solver};
+use super::held_twists::TwistRecord;
+use crate::body::{ConstraintKey, DeformableBody, HeldTwist, Integrator, Solver};
 use crate::contact::{Endpoint, Law};
 use crate::energy::CavityFilling;
 use crate::material::DeformableMaterial;
@@ -32,6 +33,8 @@ pub(super) struct StepRecord {
     pub activations: Vec<f64>,
     /// Of the cavities; empty while there are none.
     pub fillings: Vec<Option<CavityFilling>>,
+    /// Rods that were held against roll.
+    pub twists: Vec<TwistRecord>,
     /// Of the world [m/s²], and the body's factor on it.
     pub gravity: Vec3,
     pub gravity_scale: f64,
@@ -73,7 +76,8 @@ impl StepRecord {
         check_step(body, solved)?;
         let turn = Vec3::from(body.angvel()).norm() * problem.h();
         let is_mean = (0..body.state.v.len()).all(|n| body.state.v[n] == problem.mean_velocity(n));
-        let is_free = solved.in_flight && problem.key.pins.is_empty() && problem.settings.keeps_spin;
+        let is_held = !problem.key.pins.is_empty() || problem.are_ends_held();
+        let is_free = solved.in_flight && !is_held && problem.settings.keeps_spin;
         // Beyond half a radian in a step nothing is given back.
         let keeps_spin = is_free && !(is_mean && turn > TURNS);
         if !keeps_spin && !is_mean {
@@ -88,6 +92,7 @@ impl StepRecord {
             materials: body.materials.clone(),
             activations: body.activations.clone(),
             fillings: body.fillings.clone(),
+            twists: body.state.twists.iter().map(twist_record).collect(),
             gravity,
             gravity_scale: body.gravity_scale(),
             forces: body.forces.clone(),
@@ -95,6 +100,10 @@ impl StepRecord {
             keeps_spin,
         })
     }
+}
+
+fn twist_record(held: &HeldTwist) -> TwistRecord {
+    TwistRecord { rod: held.rod as usize, frames: held.frames(), twist: held.roll + held.angle }
 }
 
 fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
@@ -106,7 +115,6 @@ fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
         (body.settings().solver == Solver::Xpbd, "position-based dynamics does not end at a minimum"),
         (body.materials.iter().any(resists), "stiffness damping and Maxwell branches have none"),
         (body.materials.iter().any(|m| m.orthotropic.is_some()), "woven sheets have none"),
-        (!body.state.twists.is_empty(), "rods that are held against roll have none"),
         (body.wind().is_some(), "wind has none"),
     ];
     why.iter().find(|(is_so, _)| *is_so).map_or(Ok(()), |(_, what)| Err(*what))
@@ -133,7 +141,7 @@ impl ContactRecord {
     fn new(contact: &SolvedContact<'_>) -> Result<Self, &'static str> {
         let constraint = contact.constraint;
         let ConstraintKey::Obstacle(key) = constraint.key else {
-            return Err("contacts with deformable bodies, attachments that yield and cables have none");
+            return Err("contacts with deformable bodies, attachments that yield, and cables have none");
         };
         let (Law::Contact { friction }, Endpoint::Soft { nodes, weights, .. }, true) =
             (constraint.law, &constraint.endpoints[0], contact.is_on_prescribed)
@@ -176,5 +184,28 @@ impl ContactRecord {
     pub fn weighted_nodes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         let pairs = self.nodes.iter().zip(self.weights).filter(|(_, weight)| *weight != 0.0);
         pairs.map(|(node, weight)| (*node as usize, weight))
+    }
+}
+
+#[cfg(test)]
+impl StepRecord {
+    /// Of a body of one material that nothing but its elements acts on.
+    pub fn still(x: &[Vec3], elements: &crate::fem::Elements<'_>, h: f64) -> Self {
+        Self {
+            h,
+            pins: Vec::new(),
+            x_start: x.to_vec(),
+            v_start: Vec::new(),
+            x_end: x.to_vec(),
+            materials: elements.materials.to_vec(),
+            activations: elements.activations.to_vec(),
+            fillings: Vec::new(),
+            twists: Vec::new(),
+            gravity: Vec3::zeros(),
+            gravity_scale: 1.0,
+            forces: Vec::new(),
+            contacts: Vec::new(),
+            keeps_spin: false,
+        }
     }
 }

@@ -1,8 +1,9 @@
 //! Solves with the Hessian of a step where it has ended: its Cholesky factor, or, where it is not definite, GMRES with the factor of
-//! what is left without its negative part [Saad & Schultz 1986]; and what filled cavities resist, one direction each.
+//! what is left without its negative part [Saad & Schultz 1986]; and what filled cavities and held rods resist, one direction each.
 
-use super::filled_rooms::FilledRooms;
-use crate::energy::CavityFilling;
+use super::directions::Directions;
+use super::filled_rooms::{FilledRoom, filled_rooms};
+use super::record::StepRecord;
 use crate::fem::{DeformableModel, Elements, SystemMatrix};
 use crate::math::{Mat3, Vec3};
 use crate::solver::linear::{
@@ -23,62 +24,63 @@ pub(super) struct Tangent {
     /// Its elastic blocks in the rows of pinned nodes.
     beside: Vec<(usize, usize, Mat3)>,
     pins: Vec<u32>,
-    pub rooms: FilledRooms,
+    pub rooms: Vec<FilledRoom>,
+    directions: Directions,
 }
 
 impl Tangent {
     pub fn new(model: &DeformableModel) -> Option<Self> {
         let symbolic = pattern_of(model, SystemMatrix::RestStiffness)?;
-        let (scratch, rooms) = (FactorScratch::default(), FilledRooms::default());
-        let (beside, pins) = (Vec::new(), Vec::new());
-        Some(Self { symbolic, scratch, factor: None, values: None, beside, pins, rooms })
+        let (scratch, directions) = (FactorScratch::default(), Directions::default());
+        let (beside, pins, rooms) = (Vec::new(), Vec::new(), Vec::new());
+        Some(Self { symbolic, scratch, factor: None, values: None, beside, pins, rooms, directions })
     }
 
-    /// Makes it of a step of `h` \[s\] that has ended at `x`, with cavities filled so; false if that cannot be.
-    pub fn update(
-        &mut self,
-        elements: &Elements<'_>,
-        fillings: &[Option<CavityFilling>],
-        x: &[Vec3],
-        pins: &[u32],
-        h: f64,
-    ) -> bool {
+    /// Makes it of a step where that has ended, with these nodes held; false if that cannot be.
+    pub fn update(&mut self, model: &DeformableModel, record: &StepRecord, pins: &[u32]) -> bool {
+        let StepRecord { h, x_end: x, materials, activations, twists, .. } = record;
+        let (h, elements) = (*h, Elements { model, materials, activations });
         self.beside.clear();
         self.pins.clear();
         self.pins.extend_from_slice(pins);
-        self.rooms.read(elements.model, fillings, x);
+        self.rooms = filled_rooms(model, &record.fillings, x);
+        let of_rooms = self.rooms.iter().map(FilledRoom::direction);
+        self.directions.set(of_rooms.chain(twists.iter().map(|twist| twist.direction(model, materials, x))));
         let (symbolic, beside, rooms) = (&self.symbolic, &mut self.beside, &self.rooms);
-        let pressed = |add: &mut dyn FnMut(usize, usize, &Mat3)| rooms.add_pressed(elements.model, x, add);
+        let others = |add: &mut dyn FnMut(usize, usize, &Mat3)| {
+            rooms.iter().for_each(|room| room.add_pressed(model, x, add));
+            twists.iter().for_each(|twist| twist.add_twisted(model, materials, x, add));
+        };
         let values =
-            assemble_tangent_beside(elements, x, false, pins, h, symbolic, pressed, |i, j, block| {
+            assemble_tangent_beside(&elements, x, false, pins, h, symbolic, others, |i, j, block| {
                 beside.push((i, j, *block));
             });
         self.values = None;
         self.factor = symbolic.factorize(&values, &mut self.scratch).ok();
         if self.factor.is_none() {
-            let projected = assemble_tangent(elements, x, true, pins, h, symbolic);
+            let projected = assemble_tangent(&elements, x, true, pins, h, symbolic);
             self.factor = symbolic.factorize(&projected, &mut self.scratch).ok();
             self.values = Some(values);
         }
         self.factor.is_some() && self.find_responses()
     }
 
-    /// Finds how the rooms answer to one another.
+    /// Finds how the directions answer to one another.
     fn find_responses(&mut self) -> bool {
-        let mut responses = self.rooms.pushes(&self.pins);
-        let is_solved = self.solve_without_rooms(&mut responses);
-        self.rooms.set_responses(responses);
+        let mut responses = self.directions.pushes(&self.pins);
+        let is_solved = self.solve_without_directions(&mut responses);
+        self.directions.set_responses(responses);
         is_solved
     }
 
     /// Solves `H z = b` in place for columns of three numbers a node, zero at pinned ones; false if that fails.
     pub fn solve(&mut self, columns: &mut [f64]) -> bool {
-        let is_solved = self.solve_without_rooms(columns);
+        let is_solved = self.solve_without_directions(columns);
         let n = self.symbolic.column_starts().len() - 1;
-        is_solved && columns.chunks_exact_mut(n).all(|column| self.rooms.take_off(column))
+        is_solved && columns.chunks_exact_mut(n).all(|column| self.directions.take_off(column))
     }
 
-    fn solve_without_rooms(&mut self, columns: &mut [f64]) -> bool {
+    fn solve_without_directions(&mut self, columns: &mut [f64]) -> bool {
         let Some(factor) = &self.factor else { return false };
         let Some(values) = &self.values else {
             self.symbolic.solve_batch(factor, columns, &mut self.scratch);
@@ -96,14 +98,14 @@ impl Tangent {
     /// Takes `K z` off what acts on pinned nodes.
     pub fn take_off_pinned(&self, z: &[Vec3], out: &mut [Vec3]) {
         self.beside.iter().for_each(|(i, j, block)| out[*i] -= block * z[*j]);
-        self.rooms.resist(z, |node| self.pins.binary_search(&(node as u32)).is_ok(), out);
+        self.directions.resist(z, |node| self.pins.binary_search(&(node as u32)).is_ok(), out);
     }
 
     /// Takes `K z`, z of pinned nodes, off what acts on free ones.
     pub fn take_off_free(&self, z: &[Vec3], is_free: &[bool], out: &mut [Vec3]) {
         let to_free = self.beside.iter().filter(|(i, j, _)| is_free[*j] && z[*i] != Vec3::zeros());
         to_free.for_each(|(i, j, block)| out[*j] -= block.tr_mul(&z[*i]));
-        self.rooms.resist(z, |node| is_free[node], out);
+        self.directions.resist(z, |node| is_free[node], out);
     }
 }
 
@@ -198,7 +200,8 @@ mod tests {
             // Squeezed along its length it would buckle.
             let x: Vec<Vec3> = model.rest.iter().map(|X| Vec3::new(X.x * squeeze, X.y, X.z)).collect();
             let mut tangent = Tangent::new(&model).unwrap();
-            assert!(tangent.update(&elements, &[], &x, &pins, 1.0));
+            let record = StepRecord::still(&x, &elements, 1.0);
+            assert!(tangent.update(&model, &record, &pins));
             assert_eq!(tangent.values.is_none(), is_definite);
             let symbolic = &tangent.symbolic;
             let values = assemble_tangent(&elements, &x, false, &pins, 1.0, symbolic);

@@ -68,5 +68,5 @@ pub use state::DeformableState;
 pub(crate) use state::{History, Sleep, Surroundings, is_number};
 pub use stress::DeformableStress;
 pub(crate) use touching::TouchKey;
-pub(crate) use twist::HeldEnd;
+pub(crate) use twist::{HeldEnd, HeldTwist};
 pub use wind::DeformableWind;

@@ -4,7 +4,7 @@
 
 use super::model::DeformableModel;
 use crate::material::DeformableMaterial;
-use crate::math::Vec3;
+use crate::math::{Mat3, Vec3, skew};
 use std::f64::consts::{PI, TAU};
 
 /// A cosine above −1 by less is of an edge that goes straight back: the angle jumps there, and its slope is bounded by this.
@@ -98,6 +98,41 @@ impl TwistedRod<'_> {
     }
 }
 
+impl TwistedRod<'_> {
+    /// Calls `f` with parts of the second derivative of the angle by the positions of two nodes [1/m²], the larger first. They add up to a
+    /// symmetric matrix; no part has to be.
+    pub fn second_derivatives(&self, x: &[Vec3], mut f: impl FnMut(usize, usize, Mat3)) {
+        self.for_each_turn(x, |segments, directions| {
+            let [from, to] = directions;
+            let share = 1.0 / (1.0 + from.dot(&to)).max(REVERSED);
+            let bend = from.cross(&to) * share;
+            // Of the bend by the directions before and after.
+            let of = [
+                (-skew(&to) - bend * to.transpose()) * share,
+                (skew(&from) - bend * from.transpose()) * share,
+            ];
+            let lengths = segments.map(|segment| segment.map(|k| self.segment(k, x).0).filter(|l| *l > 0.0));
+            for (place, other) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let (Some(k), Some(length)) = (segments[place], lengths[place]) else { continue };
+                let (Some(a), Some(other_length)) = (segments[other], lengths[other]) else { continue };
+                let t = directions[other];
+                let across = Mat3::identity() - t * t.transpose();
+                let mut block = of[other] * across / (length * other_length);
+                if place == other {
+                    block -= bend * t.transpose() / (length * length);
+                }
+                for (i, one) in [(self.nodes[k], -1.0), (self.nodes[k + 1], 1.0)] {
+                    for (j, two) in [(self.nodes[a], -1.0), (self.nodes[a + 1], 1.0)] {
+                        if i >= j {
+                            f(i as usize, j as usize, block * (one * two));
+                        }
+                    }
+                }
+            }
+        });
+    }
+}
+
 impl EndFrame {
     /// One of this direction, its director anywhere across.
     pub fn across(tangent: Vec3) -> Self {
@@ -143,6 +178,7 @@ mod tests {
     use super::*;
     use crate::mesh::Structure;
     use proptest::prelude::*;
+    use std::ops::AddAssign;
 
     fn rod(points: &[Vec3]) -> DeformableModel {
         let points: Vec<[f64; 3]> = points.iter().map(|p| (*p).into()).collect();
@@ -214,6 +250,20 @@ mod tests {
             let wanted: f64 = gradient.iter().zip(&directions).map(|(g, d)| g.dot(d)).sum();
             // Central differences: 1e-12 of third derivatives up to 1e4, 1e-15/1e-6 of rounding.
             prop_assert!((slope - wanted).abs() < 1e-6 * (1.0 + wanted.abs()), "{slope} {wanted}");
+            let mut second = nalgebra::DMatrix::<f64>::zeros(3 * x.len(), 3 * x.len());
+            twisted.second_derivatives(&place(0.0), |i, j, block| {
+                second.view_mut((3 * i, 3 * j), (3, 3)).add_assign(&block);
+            });
+            let lower = nalgebra::DMatrix::from_fn(3 * x.len(), 3 * x.len(), |r, c| second[(r.max(c), r.min(c))]);
+            let of_gradient = |t: f64| {
+                let mut gradient = vec![Vec3::zeros(); x.len()];
+                twisted.add_gradient(&place(t), 1.0, &mut gradient);
+                nalgebra::DVector::from_iterator(3 * x.len(), gradient.iter().flat_map(|g| [g.x, g.y, g.z]))
+            };
+            let slope = (of_gradient(1e-6) - of_gradient(-1e-6)) / 2e-6;
+            let along = nalgebra::DVector::from_iterator(3 * x.len(), directions.iter().flat_map(|d| [d.x, d.y, d.z]));
+            let wanted = lower * along;
+            prop_assert!((&slope - &wanted).amax() < 1e-5 * (1.0 + wanted.amax()), "{slope} {wanted}");
             let force: Vec3 = gradient.iter().sum();
             prop_assert!(force.norm() < 1e-10, "{force}");
             if closes {

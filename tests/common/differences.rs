@@ -21,6 +21,8 @@ pub struct Run {
     pub activation: f64,
     /// What fills the first cavity.
     pub filling: Option<CavityFilling>,
+    /// Of the last end of the first rod, if that is held \[rad\].
+    pub roll: Option<f64>,
     /// Of the floor; none if there is no friction.
     pub friction: f64,
 }
@@ -37,6 +39,7 @@ impl Run {
             lead: 0.25,
             activation: 1.0,
             filling: None,
+            roll: None,
             friction: 0.0,
         }
     }
@@ -97,6 +100,7 @@ impl Scene {
         let floor = self.floor.map(|height| add_floor(&mut physics, height, run.friction));
         let mut world = DeformableWorld::new();
         let builder = self.builder.clone().material(run.material).can_sleep(false);
+        let builder = run.roll.map_or(builder.clone(), |roll| builder.hold_twist(0, roll));
         let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
         let handle = world
             .insert(builder.settings(settings.contact_tolerance(1e-12).keeps_spin(self.keeps_spin)))

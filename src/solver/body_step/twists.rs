@@ -45,7 +45,7 @@ impl BodyProblem {
     }
 
     /// Whether something outside of the body turns an end of a rod.
-    pub(super) fn are_ends_held(&self) -> bool {
+    pub fn are_ends_held(&self) -> bool {
         self.twists.iter().any(|spring| !self.twisted(spring).is_ring())
     }
 
