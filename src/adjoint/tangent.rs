@@ -7,7 +7,7 @@ use super::record::StepRecord;
 use crate::fem::{DeformableModel, Elements, SystemMatrix};
 use crate::math::{Mat3, Vec3};
 use crate::solver::linear::{
-    Factor, FactorScratch, Symbolic, assemble_tangent, assemble_tangent_beside, pattern_of,
+    Factor, FactorScratch, Symbolic, TangentPlace, assemble_tangent, assemble_tangent_beside, pattern_of,
 };
 
 /// Residual of GMRES over its right-hand side, and its iterations at the most.
@@ -51,10 +51,10 @@ impl Tangent {
             rooms.iter().for_each(|room| room.add_pressed(model, x, add));
             twists.iter().for_each(|twist| twist.add_twisted(model, materials, x, add));
         };
-        let values =
-            assemble_tangent_beside(&elements, x, false, pins, h, symbolic, others, |i, j, block| {
-                beside.push((i, j, *block));
-            });
+        let place = TangentPlace { x, projected: false, pins, h };
+        let values = assemble_tangent_beside(&elements, &place, symbolic, others, |i, j, block| {
+            beside.push((i, j, *block));
+        });
         self.values = None;
         self.factor = symbolic.factorize(&values, &mut self.scratch).ok();
         if self.factor.is_none() {

@@ -91,7 +91,7 @@ impl DeformableBody {
 }
 
 impl DeformableBodyBuilder {
-    /// Fills a cavity, by its place among [`DeformableModel::cavities`]: [`DeformableBody::fill_cavity`]. One that is not there is
+    /// Fills a cavity, by its place among [`DeformableModel::cavities`](crate::DeformableModel::cavities), as [`DeformableBody::fill_cavity`]. One that is not there is
     /// an error of [`DeformableBodyBuilder::build`].
     pub fn fill_cavity(mut self, cavity: usize, filling: CavityFilling) -> Self {
         self.fillings.push((cavity, filling));

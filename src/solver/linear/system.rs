@@ -160,22 +160,31 @@ pub(crate) fn assemble_tangent(
     h: f64,
     symbolic: &Symbolic,
 ) -> Vec<f64> {
-    assemble_tangent_beside(elements, x, projected, pins, h, symbolic, |_| (), |_, _, _| ())
+    let place = TangentPlace { x, projected, pins, h };
+    assemble_tangent_beside(elements, &place, symbolic, |_| (), |_, _, _| ())
+}
+
+/// Where a tangent is taken.
+pub(crate) struct TangentPlace<'a> {
+    pub x: &'a [Vec3],
+    /// Without its negative part.
+    pub projected: bool,
+    pub pins: &'a [u32],
+    /// \[s\]
+    pub h: f64,
 }
 
 /// As [`assemble_tangent`], with the blocks that `more` adds for pairs of nodes of a triangle, and with `beside(i, j, K)` for every
 /// block of these and of elements in the row of a pinned node i.
 pub(crate) fn assemble_tangent_beside(
     elements: &Elements<'_>,
-    x: &[Vec3],
-    projected: bool,
-    pins: &[u32],
-    h: f64,
+    place: &TangentPlace<'_>,
     symbolic: &Symbolic,
     more: impl FnOnce(&mut dyn FnMut(usize, usize, &Mat3)),
     mut beside: impl FnMut(usize, usize, &Mat3),
 ) -> Vec<f64> {
     let Elements { model, materials, .. } = elements;
+    let TangentPlace { x, projected, pins, h } = *place;
     let mut matrix = Upper::new(model, materials, pins, SystemMatrix::RestStiffness, h, symbolic);
     let stiffening = |material: &DeformableMaterial| material.stiffening(h);
     let mut add = |i: usize, j: usize, block: &Mat3| {
