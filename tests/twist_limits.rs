@@ -219,6 +219,8 @@ fn both_ends_may_be_on_one_body() {
     let to = AttachTo::RigidBody(frame, *physics.bodies[frame].position());
     deformables.bodies.attach(rods, &(0..17).collect::<Vec<_>>(), to).unwrap();
     physics.bodies[frame].set_angvel(Vector::new(2.0, 1.0, -0.5), true);
+    // The rods start still.
+    deformables.step(&mut physics);
     for _ in 0..100 {
         deformables.step(&mut physics);
         let [one, other] = twists(&deformables, rods);
@@ -251,4 +253,85 @@ fn ends_may_be_on_links_and_on_what_goes() {
     }
     println!("twists {:?}", twists(&deformables, rods));
     assert!(twists(&deformables, rods).iter().all(|twist| twist.abs() < 2.0));
+}
+
+/// A twisted ring that a free body is attached to turns nothing by itself.
+#[test]
+fn rings_turn_nothing_that_they_are_attached_to() {
+    let (mut physics, mut deformables) = world();
+    let at = |k: usize| {
+        let angle = 2.0 * PI * k as f64 / 24.0;
+        [0.2 * angle.cos(), 0.2 * angle.sin(), 0.0]
+    };
+    let ring = Structure::ring(&(0..24).map(at).collect::<Vec<_>>(), RADIUS).unwrap();
+    assert!(Structure::ring(&[at(0), at(1)], RADIUS).is_err());
+    let ring = DeformableBodyBuilder::structure(&ring).material(DeformableMaterial::new(1.0e7, 0.3));
+    let ring = deformables.insert(ring.hold_twist(0, 3.0).can_sleep(false)).unwrap();
+    let body = physics.insert_body(dynamic(0.2, 0.0, 1.0e-2));
+    let to = AttachTo::RigidBody(body, *physics.bodies[body].position());
+    deformables.bodies.attach(ring, &[0], to).unwrap();
+    (0..100).for_each(|_| deformables.step(&mut physics));
+    let spin = physics.bodies[body].angvel().length();
+    println!("the body turns by {spin:.1e} rad/s");
+    assert!(spin < 1.0e-3, "{spin}");
+}
+
+/// Discs at the ends of a bent rod, each held by one vertex: how far its end turns out of its disc is part of the twist, and what that
+/// does to the disc keeps the angular momentum of all.
+#[test]
+fn ends_held_by_one_vertex_keep_the_angular_momentum() {
+    let (mut physics, mut deformables) = world();
+    physics.integration_parameters.dt = 1.0e-3;
+    let at = |k: usize| [0.1 * k as f64, 0.02 * (k * (6 - k)) as f64, 0.0];
+    let points: Vec<[f64; 3]> = (0..7).map(at).collect();
+    let rod = DeformableBodyBuilder::structure(&Structure::rod(&points, 0.01).unwrap());
+    let material = DeformableMaterial::new(1.0e6, 0.3).density(10.0);
+    let rod = deformables.insert(rod.material(material).hold_twist(0, 0.0).can_sleep(false)).unwrap();
+    let discs = [0, 6].map(|end| {
+        let disc = physics.insert_body(dynamic(points[end][0] as f32, points[end][1] as f32, 2.0e-3));
+        let to = AttachTo::RigidBody(disc, *physics.bodies[disc].position());
+        deformables.bodies.attach(rod, &[end], to).unwrap();
+        disc
+    });
+    // Aside of the rod's ends: their directions come to differ from what the discs hold.
+    physics.bodies[discs[0]].set_angvel(Vector::new(2.0, -3.0, 6.0), true);
+    let momentum = |physics: &PhysicsWorld, deformables: &DeformableWorld| {
+        let mut sum = [0.0; 3];
+        for body in discs.map(|disc| &physics.bodies[disc]) {
+            let spin = body.angvel() * 2.0e-3 + body.translation().cross(body.linvel());
+            (0..3).for_each(|k| sum[k] += f64::from(spin[k]));
+        }
+        let body = &deformables.bodies[rod];
+        let (own, p, x) = (body.angular_momentum(), body.linear_momentum(), body.center_of_mass());
+        let orbit = [x[1] * p[2] - x[2] * p[1], x[2] * p[0] - x[0] * p[2], x[0] * p[1] - x[1] * p[0]];
+        (0..3).for_each(|k| sum[k] += own[k] + orbit[k]);
+        sum
+    };
+    let start = momentum(&physics, &deformables);
+    let mut off = 0.0_f64;
+    for _ in 0..300 {
+        deformables.step(&mut physics);
+        let now = momentum(&physics, &deformables);
+        off = now.iter().zip(&start).map(|(a, b)| (a - b).abs()).fold(off, f64::max);
+    }
+    let twist = deformables.bodies[rod].twist(0).unwrap().unwrap();
+    println!("twisted by {twist:.3} rad; {off:.1e} of {start:.3?} kg m²/s is off");
+    // 1e-4 with torques about what holds the ends alone.
+    assert!(off < 1.0e-5, "{off}");
+}
+
+/// Statics waits for what turns, and counts whole turns of it.
+#[test]
+fn rest_is_found_of_discs_that_turn() {
+    for has_floor in [false, true] {
+        let mut pendulum = pendulum(0.01, Solver::Newton);
+        if has_floor {
+            let floor = ColliderBuilder::cuboid(5.0, 0.5, 5.0).translation(Vector::Y * -3.0);
+            pendulum.physics.insert(RigidBodyBuilder::fixed(), floor);
+        }
+        pendulum.physics.bodies[pendulum.disc].add_torque(Vector::new(0.0, 6.0, 0.0), true);
+        let rest = pendulum.deformables.find_rest(&mut pendulum.physics, 1.0e-8, 400);
+        println!("floor {has_floor}: {rest:?}, turned by {:.6}", pendulum.turned());
+        assert!(rest.is_found && (pendulum.turned().abs() - 7.5).abs() < 1.0e-3, "{}", pendulum.turned());
+    }
 }

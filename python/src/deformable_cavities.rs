@@ -66,7 +66,7 @@ impl PyDeformableBody {
 
     /// Holds both ends of a rod against roll: from now on it resists twist. `roll` [rad] is how far its last end is rolled against
     /// the first, right-handed about the rod, beyond how both are when it is held first. An end whose vertex is attached to a rigid
-    /// body rolls with it, and the torque acts on that body; others are held in the world.
+    /// body, without compliance or length, rolls with it from the next step on, and the torque acts on that body; others are held in the world.
     #[pyo3(signature = (roll, rod = 0))]
     fn hold_twist(&self, py: Python<'_>, roll: f64, rod: usize) -> PyResult<()> {
         self.try_with(py, |body| body.hold_twist(rod, roll))

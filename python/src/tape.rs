@@ -7,6 +7,7 @@ use crate::world::{World, in_turns};
 use foible3d::{DeformableGradient, DeformableTape, MaterialGradient, StepGradient};
 use numpy::{PyArray1, PyArray3};
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -15,7 +16,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// what acted on it can be had: exact ones of the converged steps, contact included.
 ///
 /// Steps have to be solved far: a ``tolerance`` of 1e-10 or less and ``max_iterations`` enough, as ``Fidelity.REFERENCE`` has them. What has no
-/// gradient is refused when it is recorded, with the reason: `docs/limits.md` lists it. Every step is kept until ``clear``.
+/// gradient is refused when it is recorded, with the reason: `docs/limits.md` lists it. Every step is kept until ``clear``. All steps of the body in
+/// between have to be the tape's: what other steps do counts as done by hand.
 #[pyclass(frozen, name = "Tape", module = "foible3d")]
 pub struct PyTape {
     world: Py<World>,
@@ -24,13 +26,18 @@ pub struct PyTape {
 }
 
 impl PyTape {
-    fn lock(&self) -> MutexGuard<'_, DeformableTape> {
+    /// The tape, while not attached to Python: whoever has it may wait for the world.
+    fn lock_detached(&self) -> MutexGuard<'_, DeformableTape> {
         self.tape.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    fn lock(&self, py: Python<'_>) -> MutexGuard<'_, DeformableTape> {
+        self.tape.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// A step by Python's numbers: from the end if negative.
-    fn place(&self, step: isize) -> PyResult<usize> {
-        let steps = self.lock().len();
+    fn place(&self, py: Python<'_>, step: isize) -> PyResult<usize> {
+        let steps = self.lock(py).len();
         let place = if step < 0 { steps.checked_add_signed(step) } else { Some(step as usize) };
         place
             .filter(|place| *place < steps)
@@ -40,6 +47,7 @@ impl PyTape {
     /// Rows of derivatives by steps.
     fn by_step(
         &self,
+        py: Python<'_>,
         given: Option<BTreeMap<isize, Bound<'_, PyAny>>>,
         name: &str,
     ) -> PyResult<Vec<(usize, Vec<[f64; 3]>)>> {
@@ -52,7 +60,11 @@ impl PyTape {
                     "{name} of step {step} has {rows} rows, but the body {vertices} vertices"
                 )));
             }
-            found.push((self.place(step)?, rows));
+            let place = self.place(py, step)?;
+            if found.iter().any(|(other, _)| *other == place) {
+                return Err(bad_value(format!("{name} name step {place} twice")));
+            }
+            found.push((place, rows));
         }
         Ok(found)
     }
@@ -76,24 +88,25 @@ impl PyTape {
     fn step(&self, py: Python<'_>, n: i64) -> PyResult<()> {
         in_turns(py, count("n", n)?, |n| {
             let taken = self.world.get().detached(py, |inner| {
-                let mut tape = self.lock();
-                (0..n).try_for_each(|_| {
-                    inner.step(1);
-                    tape.record(&inner.physics, &inner.deformables).map_err(Failure::from)
-                })
+                let mut tape = self.lock_detached();
+                for _ in 0..n {
+                    inner.step_here(1)?;
+                    tape.record(&inner.physics, &inner.deformables).map_err(Failure::from)?;
+                }
+                Ok(())
             })?;
-            Ok(taken?)
+            taken
         })
     }
 
     /// Number of steps.
-    fn __len__(&self) -> usize {
-        self.lock().len()
+    fn __len__(&self, py: Python<'_>) -> usize {
+        self.lock(py).len()
     }
 
     /// Forgets the steps.
-    fn clear(&self) {
-        self.lock().clear();
+    fn clear(&self, py: Python<'_>) {
+        self.lock(py).clear();
     }
 
     /// Force of a collider on the body in a step [N], an array of shape (3,), in the solver's precision.
@@ -103,8 +116,8 @@ impl PyTape {
         step: isize,
         collider: PyColliderHandle,
     ) -> PyResult<Array1<'py>> {
-        let place = self.place(step)?;
-        let force = self.lock().contact_force(place, collider.0);
+        let place = self.place(py, step)?;
+        let force = self.lock(py).contact_force(place, collider.0);
         Ok(triple(py, force))
     }
 
@@ -120,13 +133,13 @@ impl PyTape {
         contact_forces: Option<HashMap<(isize, PyColliderHandle), Triple>>,
     ) -> PyResult<PyGradient> {
         let (positions, velocities) =
-            (self.by_step(positions, "positions")?, self.by_step(velocities, "velocities")?);
+            (self.by_step(py, positions, "positions")?, self.by_step(py, velocities, "velocities")?);
         let forces = contact_forces.unwrap_or_default().into_iter();
-        let forces = forces.map(|((step, collider), of)| Ok((self.place(step)?, collider.0, of.0)));
+        let forces = forces.map(|((step, collider), of)| Ok((self.place(py, step)?, collider.0, of.0)));
         let forces = forces.collect::<PyResult<Vec<_>>>()?;
         let gradient = py.detach(|| {
             without_panic(|| {
-                let tape = self.lock();
+                let tape = self.lock_detached();
                 let mut loss = tape.loss();
                 for (step, rows) in &positions {
                     each(rows, |vertex, row| loss.add_position(*step, vertex, row))?;

@@ -30,7 +30,7 @@ impl Inner {
     }
 
     /// So many steps, where threads are those of this process.
-    fn step_here(&mut self, n: usize) -> PyResult<()> {
+    pub fn step_here(&mut self, n: usize) -> PyResult<()> {
         match crate::batch::is_forked() {
             true => crate::batch::pool(None)?.install(|| self.step(n)),
             false => self.step(n),

@@ -54,6 +54,7 @@ impl<'a> Backward<'a> {
         add_inertia(record, &inertia, &z, &mut of);
         let mut work = ElasticWork { model, record, z: &z, force: &mut self.force };
         work.add_materials(&mut out.materials);
+        work.add_twists(&mut out.materials);
         let activation = work.activation();
         inertia.add_materials(model, record, (&of.masses, of.damping), &mut out.materials);
         let users = |nodes: &[Vec3]| model.nodes_by_vertex().map(|n| nodes[n].into()).collect();

@@ -80,6 +80,12 @@ impl DeformableGradient {
         (0..cavities).map(|cavity| self.steps.iter().map(|step| step.pressures[cavity]).sum()).collect()
     }
 
+    /// Per radian more of roll of each rod in all steps.
+    pub fn rolls(&self) -> Vec<f64> {
+        let rods = self.steps.first().map_or(0, |step| step.rolls.len());
+        (0..rods).map(|rod| self.steps.iter().map(|step| step.rolls[rod]).sum()).collect()
+    }
+
     /// Per newton on each vertex of a force that was the same in all steps.
     pub fn forces(&self) -> Vec<[f64; 3]> {
         self.summed(|step| &step.forces)

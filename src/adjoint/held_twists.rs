@@ -47,16 +47,21 @@ impl TwistRecord {
         self.twisted(model).second_derivatives(x, |i, j, block| add(i, j, &(block * torque)));
     }
 
-    /// Adds its forces on the nodes \[N\].
-    pub fn add_forces(
+    /// Virtual work of its forces along z \[J\].
+    pub fn work(
         &self,
         model: &DeformableModel,
         materials: &[DeformableMaterial],
         x: &[Vec3],
-        out: &mut [Vec3],
-    ) {
-        let torque = model.torsional_stiffness(self.rod, materials) * self.twist;
-        self.twisted(model).add_gradient(x, -torque, out);
+        z: &[Vec3],
+    ) -> f64 {
+        self.of_roll(model, materials, x, z) * self.twist
+    }
+
+    /// What part of its compliance each segment has, by region.
+    pub fn shares(&self, model: &DeformableModel, materials: &[DeformableMaterial]) -> Vec<(usize, f64)> {
+        let stiffness = model.torsional_stiffness(self.rod, materials);
+        model.torsional_compliances(self.rod, materials).map(|(region, c)| (region, c * stiffness)).collect()
     }
 
     /// What z says of a radian more of roll.

@@ -38,9 +38,6 @@ impl ElasticWork<'_> {
         let x = &self.record.x_end;
         let at = Evaluation { damping: &damping, x, frame: &frame, limit: f64::INFINITY };
         add_forces(&elements, &at, self.force);
-        for twist in &self.record.twists {
-            twist.add_forces(self.model, materials, x, self.force);
-        }
         dot(self.force, self.z)
     }
 
@@ -84,6 +81,19 @@ impl ElasticWork<'_> {
             out.poisson_ratio += self.along(region, apart, scheme, |m, d| m.poisson_ratio += d);
             if self.model.has_fibres() {
                 out.fibre_modulus += self.along(region, by, LINEAR, |m, d| m.fibre_modulus += d);
+            }
+        }
+    }
+
+    /// Adds what held rods say, in closed form: K goes with E and with 1/(1 + ν), by the share that a region has of a rod's compliance.
+    pub fn add_twists(&self, out: &mut [MaterialGradient]) {
+        let StepRecord { materials, x_end, twists, .. } = self.record;
+        for twist in twists {
+            let work = twist.work(self.model, materials, x_end, self.z);
+            for (region, share) in twist.shares(self.model, materials) {
+                let DeformableMaterial { youngs_modulus, poisson_ratio, .. } = materials[region];
+                out[region].youngs_modulus += work * share / youngs_modulus;
+                out[region].poisson_ratio -= work * share / (1.0 + poisson_ratio);
             }
         }
     }

@@ -5,7 +5,7 @@ use super::builder::DeformableBodyBuilder;
 use super::state::DeformableState;
 use crate::error::BodyError;
 use crate::fem::{DeformableModel, EndFrame, TwistedRod};
-use crate::math::{Mat3, Vec3};
+use crate::math::{Mat3, Vec3, dot};
 use rapier3d::dynamics::RigidBodyHandle;
 
 /// How far a unit vector may be from one: it is turned in every step, by rotations of single precision.
@@ -46,8 +46,9 @@ impl HeldTwist {
 impl DeformableBody {
     /// Holds both ends of a rod against roll: from now on it resists twist, which a rod that is not held does not know. `roll` \[rad\]
     /// is how far the last end is rolled against the first, right-handed about the rod from its first vertex on, beyond how both are
-    /// now; called again it changes that, whole turns and all. An end whose vertex is attached to a rigid body rolls with it, and
-    /// the torque acts on that body; others are held in the world, whichever way they point. A ring is held by itself.
+    /// now; called again it changes that, whole turns and all. An end whose vertex is attached to a rigid body, without compliance or length, rolls
+    /// with it from the next step on, and the torque acts on that body; others are held in the world, whichever way they point. A ring is
+    /// held by itself.
     ///
     /// The twist is alike all along: it has no inertia [Bergou et al. 2008]. The section is round; a rod that is bent at rest keeps how
     /// much it bends there, and not which way.
@@ -129,6 +130,14 @@ impl DeformableBody {
             // Of nodes that are not numbers the last one stays.
             held.angle = if angle.is_finite() { angle } else { held.angle };
         }
+    }
+
+    /// How fast the motion of the nodes twists a rod [rad/s].
+    pub(crate) fn twist_by_motion(&self, held: &HeldTwist) -> f64 {
+        let (nodes, frames) = (self.model.rod(held.rod as usize), held.frames());
+        let mut gradient = vec![Vec3::zeros(); self.state.x.len()];
+        TwistedRod { nodes, frames: &frames }.add_gradient(&self.state.x, 1.0, &mut gradient);
+        dot(&gradient, &self.state.v)
     }
 
     /// Adds what twisted rods do to the nodes \[N\]; gives their energy \[J\].

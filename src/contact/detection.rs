@@ -200,7 +200,9 @@ impl Detector {
             let is_sheet = scene.obstacle.solidity() == Solidity::Sheet;
             let carried = is_sheet.then(|| against_carried(scene.obstacle, nodes[s], memory)).flatten();
             self.nodes[s] = match carried {
-                Some(outward) => carried_point(scene.obstacle, &p, &outward, &scene.scales),
+                Some(outward) => {
+                    carried_point(scene.obstacle, &p, &outward, surface.is_thin[s], &scene.scales)
+                }
                 None => surface_point(scene.obstacle, &p, &outward(), &scene.scales),
             };
             self.found.push(s as u32);

@@ -52,6 +52,9 @@ const PASSED_LINE: f64 = 0.75;
 /// 24 cubes on the sheet's border swayed.
 const PROJECTED: f64 = 3.0e-7;
 
+/// Cosine between the back of a wall and the normal that carried a node from which on it is taken for the same wall.
+const SAME_WALL: f64 = 0.9;
+
 /// Projects `p` (in the obstacle's frame) onto the obstacle. `outward` is the unit normal of the
 /// body's own surface at `p`, in that frame too. `None` where parry finds nothing, as for
 /// non-finite input.
@@ -98,15 +101,20 @@ pub(crate) fn surface_point(
 }
 
 /// As [`surface_point`], of a node that a sheet carried in the last step along a normal against `outward`: it is on that side
-/// of it still, however far it has passed.
+/// of it still, however far it has passed. One of a sheet or a rod (`is_thin`) may be between two walls and near the other one now: there it
+/// counts as passed only where the body's middle is beyond the wall too.
 pub(crate) fn carried_point(
     obstacle: &Obstacle,
     p: &Vec3,
     outward: &Vec3,
+    is_thin: bool,
     scales: &Scales,
 ) -> Option<SurfacePoint> {
     let hit = project(obstacle, p)?;
-    on_sheet(&hit, p, outward, hit.distance <= scales.band, |_| true)
+    let is_behind = |normal: &Vec3| {
+        !is_thin || normal.dot(outward) > SAME_WALL || (scales.middle - hit.point).dot(normal) < 0.0
+    };
+    on_sheet(&hit, p, outward, hit.distance <= scales.band, is_behind)
 }
 
 /// On the side of a sheet where `p` is, unless it looks out of the body there and `is_behind` says so.
@@ -327,7 +335,7 @@ mod tests {
                 assert!(depth <= 0.0 || (crushed.normal - Vec3::y() * side).norm() < 1e-6);
                 // What it carried comes back from any depth.
                 let (deep, against) = (Vec3::new(0.05, -0.2 * side, 0.02), Vec3::y() * -side);
-                let carried = carried_point(&obstacle, &deep, &against, &scales).unwrap();
+                let carried = carried_point(&obstacle, &deep, &against, false, &scales).unwrap();
                 assert!(
                     (carried.normal - Vec3::y() * side).norm() < 1e-6 && (carried.gap + 0.2).abs() < 1e-6
                 );

@@ -52,4 +52,4 @@ pub(crate) use parts::{RapierSets, StepContext, body_handle, collider_handle, im
 pub use query_colliders::DeformableColliders;
 pub(crate) use reactions::Reactions;
 pub(crate) use scene::RapierScene;
-pub(crate) use twists::{place_twists, twist_constraints};
+pub(crate) use twists::{note_twist, place_twists, twist_constraints};

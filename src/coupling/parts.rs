@@ -115,7 +115,7 @@ pub(crate) fn packed((index, generation): (u32, u32)) -> u64 {
 }
 
 /// Slot and generation of a packed handle.
-fn unpacked(key: u64) -> (u32, u32) {
+pub(super) fn unpacked(key: u64) -> (u32, u32) {
     ((key >> 32) as u32, key as u32)
 }
 

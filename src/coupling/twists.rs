@@ -24,6 +24,10 @@ pub(crate) fn place_twists(
         for held in &mut twists {
             let nodes = body.model.rod(held.rod as usize);
             let nodes = [nodes[0], nodes[nodes.len() - 1]];
+            // A ring is held by itself.
+            if nodes[0] == nodes[1] {
+                continue;
+            }
             for (end, node) in held.ends.iter_mut().zip(nodes) {
                 take_hold(end, holder(deformables, handle, node), context);
             }
@@ -79,6 +83,19 @@ fn led_turn(rigid: RigidBodyHandle, scene: &mut RapierScene, context: &StepConte
     Some(end.rotation * start.rotation.transpose())
 }
 
+/// Takes the twist to which the torque between rigid bodies has come: they have turned by it, further than was foreseen. `along` is the torque
+/// on the last end [N·m].
+pub(crate) fn note_twist(deformables: &mut DeformableBodySet, ends: RodEnds, along: f64) {
+    let (index, generation) = super::parts::unpacked(ends.body);
+    let Some(body) = deformables.get_mut(DeformableBodyHandle::from_raw_parts(index, generation)) else {
+        return;
+    };
+    let stiffness = body.model.torsional_stiffness(ends.rod as usize, &body.materials);
+    if let Some(held) = body.state.twists.iter_mut().find(|held| held.rod == ends.rod) {
+        held.angle = -along / stiffness - held.roll;
+    }
+}
+
 /// Adds the torques on rigid bodies that yield.
 pub(crate) fn twist_constraints(
     deformables: &DeformableBodySet,
@@ -91,11 +108,12 @@ pub(crate) fn twist_constraints(
     for (handle, body) in deformables.iter().filter(|(handle, _)| is_stepped(*handle)) {
         for held in &body.state.twists {
             let mut path = Vec::new();
-            for (end, sign) in held.ends.iter().zip([-1.0, 1.0]) {
+            let segments = body.model.end_directions(held.rod as usize, &body.state.x);
+            for ((end, segment), sign) in held.ends.iter().zip(&segments).zip([-1.0, 1.0]) {
                 let proxy = end.on.and_then(|rigid| scene.body_proxy(context, rigid));
                 if let Some(proxy) = proxy.filter(|proxy| scene.proxies.yields(*proxy)) {
-                    let endpoint = Endpoint::Rotation { proxy };
-                    path.push(PathPoint { endpoint, direction: end.placed.tangent * sign });
+                    let direction = end.placed.axis_of_torque(segment) * sign;
+                    path.push(PathPoint { endpoint: Endpoint::Rotation { proxy }, direction });
                 }
             }
             if path.is_empty() {
@@ -103,7 +121,7 @@ pub(crate) fn twist_constraints(
             }
             let key =
                 ConstraintKey::Twist(RodEnds { body: super::packed(handle.into_raw_parts()), rod: held.rod });
-            let gap = held.roll + held.angle;
+            let gap = held.roll + held.angle + body.twist_by_motion(held) * context.h;
             let mut torque = Constraint::along(path, scene.world_proxy(), gap, Law::BILATERAL, key);
             torque.compliance = 1.0 / body.model.torsional_stiffness(held.rod as usize, &body.materials);
             constraints.push(torque);

@@ -25,6 +25,12 @@ pub(crate) struct EndFrame {
 }
 
 impl EndFrame {
+    /// How the angle of a rod grows with a turn of the frame that holds its last end, where the rod's end points along `segment`: as about both,
+    /// where they differ [–].
+    pub fn axis_of_torque(&self, segment: &Vec3) -> Vec3 {
+        (self.tangent + segment) / (1.0 + self.tangent.dot(segment)).max(REVERSED)
+    }
+
     /// The same, seen through `turn`.
     pub fn map(&self, turn: impl Fn(&Vec3) -> Vec3) -> Self {
         Self { tangent: turn(&self.tangent), director: turn(&self.director) }
@@ -146,13 +152,17 @@ impl DeformableModel {
         &self.rods[rod]
     }
 
+    /// Directions of the first and the last segment of a rod where the nodes are at `x`.
+    pub(crate) fn end_directions(&self, rod: usize, x: &[Vec3]) -> [Vec3; 2] {
+        let nodes = self.rod(rod);
+        let lying = TwistedRod { nodes, frames: &[EndFrame::across(Vec3::x()); 2] };
+        [0, nodes.len() - 2].map(|k| lying.segment(k, x).1)
+    }
+
     /// Frames that hold the ends of a rod as it lies at `x`, without twist.
     pub(crate) fn end_frames(&self, rod: usize, x: &[Vec3]) -> [EndFrame; 2] {
         let nodes = self.rod(rod);
-        let any = [EndFrame::across(Vec3::x()); 2];
-        let lying = TwistedRod { nodes, frames: &any };
-        let (first, last) = (lying.segment(0, x).1, lying.segment(nodes.len() - 2, x).1);
-        let mut frames = [EndFrame::across(first), EndFrame::across(last)];
+        let mut frames = self.end_directions(rod, x).map(EndFrame::across);
         let mut director = frames[0].director;
         TwistedRod { nodes, frames: &frames }
             .for_each_turn(x, |_, [from, to]| director = carried(&director, &from, &to));
@@ -162,14 +172,24 @@ impl DeformableModel {
 
     /// Torque per twist of a whole rod [N·m/rad], `1/Σ l/GJ` with `J = π r⁴/2`.
     pub(crate) fn torsional_stiffness(&self, rod: usize, materials: &[DeformableMaterial]) -> f64 {
+        1.0 / self.torsional_compliances(rod, materials).map(|(_, compliance)| compliance).sum::<f64>()
+    }
+
+    /// Of each segment of a rod its region and what it gives way by, `l/GJ` [rad/(N·m)].
+    pub(crate) fn torsional_compliances<'a>(
+        &'a self,
+        rod: usize,
+        materials: &'a [DeformableMaterial],
+    ) -> impl Iterator<Item = (usize, f64)> + 'a {
         let (nodes, rod) = (self.rod(rod), self.structure.rod_at(rod));
         let polar = 0.5 * PI * rod.radius.powi(4);
-        let gives = |(ends, tag): (&[u32], &u32)| {
-            let material = &materials[self.region(*tag).unwrap_or(0)];
+        nodes.windows(2).zip(&rod.regions).map(move |(ends, tag)| {
+            let region = self.region(*tag).unwrap_or(0);
+            let material = &materials[region];
             let shear = 0.5 * material.youngs_modulus / (1.0 + material.poisson_ratio);
-            (self.rest[ends[1] as usize] - self.rest[ends[0] as usize]).norm() / (shear * polar)
-        };
-        1.0 / nodes.windows(2).zip(&rod.regions).map(gives).sum::<f64>()
+            let length = (self.rest[ends[1] as usize] - self.rest[ends[0] as usize]).norm();
+            (region, length / (shear * polar))
+        })
     }
 }
 

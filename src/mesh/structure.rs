@@ -151,9 +151,12 @@ impl Structure {
     /// The same, closed: from the last point back to the first.
     ///
     /// # Errors
-    /// As [`Structure::rod`].
+    /// As [`Structure::rod`], with [`MeshError::Empty`] for fewer than three points.
     pub fn ring(points: &[[f64; 3]], radius: f64) -> Result<Self, MeshError> {
         check_finite(points)?;
+        if points.len() < 3 {
+            return Err(MeshError::Empty);
+        }
         let structure = Self { vertices: points.to_vec(), ..Self::default() };
         structure.with_rod((0..points.len() as u32).chain([0]).collect(), radius)
     }

@@ -7,7 +7,7 @@ use crate::body::{DeformableBody, DeformableState, FactorBase, Integrator, Solve
 use crate::fem::relaxed;
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
-use rapier3d::dynamics::{RigidBodyHandle, RigidBodyType};
+use rapier3d::dynamics::{RigidBody, RigidBodyHandle, RigidBodyType};
 use rapier3d::math::Vector;
 use rapier3d::pipeline::PhysicsWorld;
 
@@ -220,5 +220,11 @@ fn imbalance(body: &DeformableBody, before: &DeformableState, h: f64) -> f64 {
 fn rigid_ones_rest(physics: &PhysicsWorld, h: f64) -> bool {
     let most = RIGID_REST * f64::from(physics.gravity.length()) * h;
     let mut dynamic = physics.bodies.iter().filter(|(_, body)| body.is_dynamic() && body.is_enabled());
-    dynamic.all(|(_, body)| f64::from(body.linvel().length()) <= most)
+    let is_still = |body: &RigidBody| {
+        let mass = body.mass_properties().local_mprops;
+        // The radius of gyration.
+        let arm = f64::from(mass.principal_inertia().max_element() * mass.inv_mass).sqrt();
+        f64::from(body.linvel().length()) <= most && f64::from(body.angvel().length()) * arm <= most
+    };
+    dynamic.all(|(_, body)| is_still(body))
 }

@@ -2,7 +2,8 @@
 
 use super::quarantine::quarantine;
 use super::readout::{
-    add_attachment_forces, add_cable_forces, list_contacts, list_pair_contacts, list_rigid_forces,
+    add_attachment_forces, add_cable_forces, add_twist_torques, list_contacts, list_pair_contacts,
+    list_rigid_forces,
 };
 use super::scratch::StepScratch;
 use super::sleeping::LookAround;
@@ -44,6 +45,7 @@ impl StepScratch {
                 list_pair_contacts(work, handle_of, &mut self.pair_contacts);
                 add_attachment_forces(work, deformables);
                 add_cable_forces(work, deformables);
+                add_twist_torques(work, deformables);
                 list_rigid_forces(work, &mut self.rigid_contacts, &mut self.joint_forces);
             }
             for (problem, &index) in work.island.bodies.drain(..).zip(&work.members) {

@@ -6,7 +6,7 @@ use crate::body::{
     DeformableCableHandle, DeformableContact, DeformablePairContact, JointRole,
 };
 use crate::contact::Endpoint;
-use crate::coupling::{body_handle, collider_handle, impulse_joint_handle, note_cable_force};
+use crate::coupling::{body_handle, collider_handle, impulse_joint_handle, note_cable_force, note_twist};
 use crate::math::{Vec3, to_real};
 use crate::pipeline::{JointForce, RigidContact, SolvedJoint};
 use crate::solver::ContactResult;
@@ -28,6 +28,15 @@ pub(super) fn add_cable_forces(work: &IslandWork, deformables: &mut DeformableBo
         let ConstraintKey::Cable(CableRow { cable, part }) = constraint.key else { continue };
         if let Some(cable) = deformables.cable_mut(DeformableCableHandle(cable)) {
             note_cable_force(cable, part, force.dot(&constraint.frame[0]));
+        }
+    }
+}
+
+/// Gives twisted rods what the torques between rigid bodies have come to.
+pub(super) fn add_twist_torques(work: &IslandWork, deformables: &mut DeformableBodySet) {
+    for ContactResult { constraint, force, .. } in work.island.contacts.results() {
+        if let ConstraintKey::Twist(ends) = constraint.key {
+            note_twist(deformables, ends, force.dot(&constraint.frame[0]));
         }
     }
 }

@@ -42,6 +42,15 @@ impl BodyProblem {
         energy
     }
 
+    /// Adds the forces \[N\] of fillings and twisted rods where the nodes are at `x`.
+    pub(super) fn add_held_forces(&self, x: &[Vec3], out: &mut [Vec3]) {
+        for FilledCavity { cavity, filling, .. } in &self.cavities {
+            let room = &self.model.cavities[*cavity];
+            room.add_gradient(x, filling.pressure(room.volume(x)), out);
+        }
+        self.add_torques_at(x, out);
+    }
+
     /// Lets the preconditioner know what fillings and twisted rods resist where the iteration is; true if any does. A pressure at any
     /// volume resists nothing: P and W stay.
     pub fn refresh_low_rank(&mut self, factor: &SystemFactor) -> bool {

@@ -53,10 +53,13 @@ impl BodyProblem {
         if !self.key.pins.is_empty() {
             return;
         }
+        if self.are_ends_held() {
+            return;
+        }
         if self.is_alpha() {
             return self.balance_momenta(v);
         }
-        if !self.settings.keeps_spin || self.are_ends_held() {
+        if !self.settings.keeps_spin {
             return;
         }
         if in_flight {

@@ -95,6 +95,7 @@ impl BodyProblem {
         let (damping, frame) = (&StiffnessDamping::default(), &Mat3::identity());
         let place = Evaluation { damping, x: &self.x_start, frame, limit: f64::INFINITY };
         elastic_forces::add_forces(&self.elements(), &place, &mut start.elastic);
+        self.add_held_forces(&self.x_start, &mut start.elastic);
         for steady in &mut start.steady {
             steady.clone_from(&history.steady);
             steady.resize(n, Vec3::zeros());

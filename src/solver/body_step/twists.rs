@@ -69,6 +69,13 @@ impl BodyProblem {
         energy
     }
 
+    /// Adds the forces of twisted rods where the nodes are at `x`.
+    pub(super) fn add_torques_at(&self, x: &[Vec3], out: &mut [Vec3]) {
+        for spring in &self.twists {
+            self.twisted(spring).add_gradient(x, -spring.stiffness * self.twist(spring, x), out);
+        }
+    }
+
     /// What a twist has more of energy than that of the start of the step \[J\].
     fn twist_energy(&self, spring: &TwistSpring, twist: f64) -> f64 {
         let start = spring.roll + spring.start;
