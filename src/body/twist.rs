@@ -58,13 +58,12 @@ impl DeformableBody {
     /// use rapier3d::prelude::*;
     /// // A metre of rubber cord, clamped at both ends and twisted by two turns.
     /// let points: Vec<[f64; 3]> = (0..=20).map(|k| [0.05 * f64::from(k), 0.0, 0.0]).collect();
-    /// let rubber = DeformableMaterial::new(1.0e6, 0.5 - 1.0e-9);
+    /// let rubber = DeformableMaterial::new(1.0e6, 0.4);
     /// let cord = DeformableBodyBuilder::structure(&Structure::rod(&points, 0.01)?).material(rubber);
-    /// let mut cord = cord.build()?;
-    /// cord.pin_where(|x| x.x < 0.06 || x.x > 0.94);
+    /// let mut cord = cord.pinned(|x| x.x < 0.06 || x.x > 0.94).build()?;
     /// cord.hold_twist(0, 4.0 * std::f64::consts::PI)?;
     /// // GJ/l times the angle.
-    /// let torque = 1.0e6 / 3.0 * 0.5 * std::f64::consts::PI * 1.0e-8 * 4.0 * std::f64::consts::PI;
+    /// let torque = 1.0e6 / 2.8 * 0.5 * std::f64::consts::PI * 1.0e-8 * 4.0 * std::f64::consts::PI;
     /// assert!((cord.twist_torque(0)? / torque - 1.0).abs() < 1.0e-6);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
