@@ -76,14 +76,17 @@ impl DeformableGradient {
 
     /// Per pascal more in each cavity in all steps.
     pub fn pressures(&self) -> Vec<f64> {
-        let cavities = self.steps.first().map_or(0, |step| step.pressures.len());
-        (0..cavities).map(|cavity| self.steps.iter().map(|step| step.pressures[cavity]).sum()).collect()
+        self.columns(|step| &step.pressures)
     }
 
     /// Per radian more of roll of each rod in all steps.
     pub fn rolls(&self) -> Vec<f64> {
-        let rods = self.steps.first().map_or(0, |step| step.rolls.len());
-        (0..rods).map(|rod| self.steps.iter().map(|step| step.rolls[rod]).sum()).collect()
+        self.columns(|step| &step.rolls)
+    }
+
+    fn columns(&self, of: impl Fn(&StepGradient) -> &Vec<f64>) -> Vec<f64> {
+        let count = self.steps.first().map_or(0, |step| of(step).len());
+        (0..count).map(|place| self.steps.iter().map(|step| of(step)[place]).sum()).collect()
     }
 
     /// Per newton on each vertex of a force that was the same in all steps.

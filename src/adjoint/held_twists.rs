@@ -47,17 +47,6 @@ impl TwistRecord {
         self.twisted(model).second_derivatives(x, |i, j, block| add(i, j, &(block * torque)));
     }
 
-    /// Virtual work of its forces along z \[J\].
-    pub fn work(
-        &self,
-        model: &DeformableModel,
-        materials: &[DeformableMaterial],
-        x: &[Vec3],
-        z: &[Vec3],
-    ) -> f64 {
-        self.of_roll(model, materials, x, z) * self.twist
-    }
-
     /// What part of its compliance each segment has, by region.
     pub fn shares(&self, model: &DeformableModel, materials: &[DeformableMaterial]) -> Vec<(usize, f64)> {
         let stiffness = model.torsional_stiffness(self.rod, materials);

@@ -89,7 +89,8 @@ impl ElasticWork<'_> {
     pub fn add_twists(&self, out: &mut [MaterialGradient]) {
         let StepRecord { materials, x_end, twists, .. } = self.record;
         for twist in twists {
-            let work = twist.work(self.model, materials, x_end, self.z);
+            // Virtual work of its forces along z [J].
+            let work = twist.of_roll(self.model, materials, x_end, self.z) * twist.twist;
             for (region, share) in twist.shares(self.model, materials) {
                 let DeformableMaterial { youngs_modulus, poisson_ratio, .. } = materials[region];
                 out[region].youngs_modulus += work * share / youngs_modulus;

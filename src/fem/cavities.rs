@@ -58,9 +58,7 @@ impl Cavity {
             }
         }
     }
-}
 
-impl Cavity {
     /// Calls `f` with the second derivative of the volume by the positions of two nodes \[m\], the larger first, for every edge of the
     /// walls twice, from either side.
     pub fn second_derivatives(&self, x: &[Vec3], mut f: impl FnMut(usize, usize, Mat3)) {
