@@ -40,22 +40,24 @@ fn an_insert_moves_rigidly_thrown_and_dropped() {
             }
             worst = worst.max(error);
             // And is where rapier has the bone, to single precision and the forces' accuracy.
-            let pose = physics.bodies[bones[0].body].position();
+            let bone = &physics.bodies[bones[0].body];
+            let pose = bone.position();
+            // Rapier turns it in substeps and gyroscopically: that bends an arc by (h ω)²/2 of the bone's half length at the most.
+            let turn = f64::from(bone.angvel().length() * dt);
+            let near = 1e-4 + 0.05 * 0.5 * turn * turn;
             for &v in &core {
                 let at_rest = own.model().rest_position(v).map(|c| c as f32);
                 let at = pose.transform_point(Vector::from_array(at_rest)).to_array();
                 let x = own.position(v).unwrap();
-                off = (0..3).map(|k| (x[k] - f64::from(at[k])).abs()).fold(off, f64::max);
+                off = (0..3).map(|k| (x[k] - f64::from(at[k])).abs() / near).fold(off, f64::max);
             }
         }
         println!(
-            "{modulus:e} Pa, {dt} s: distortion {worst:.1e}, off the bone {off:.1e} m, energy at most {most:.4} of the start, {unsolved} unsolved steps with {left:.1e}, {factorizations} factorizations"
+            "{modulus:e} Pa, {dt} s: distortion {worst:.1e}, off the bone {off:.2} of what gyration does, energy at most {most:.4} of the start, {unsolved} unsolved steps with {left:.1e}, {factorizations} factorizations"
         );
         assert!(touched && worst < 1e-9, "{worst:e}");
         assert!(most < 1.005, "{most}");
-        // Rapier turns it in substeps, and gyroscopically.
-        let near = if dt > 0.04 { 6e-3 } else { 3e-3 };
-        assert!(off < near && unsolved <= 3, "{off:e} {unsolved}");
+        assert!(off < 1.0 && unsolved <= 3, "{off:e} {unsolved}");
         all_unsolved += unsolved;
     }
     assert!(all_unsolved <= 6, "{all_unsolved}");
@@ -176,6 +178,10 @@ fn more_random_throws_make_no_energy_and_keep_cores_rigid_in_most_steps() {
         let thrown = [true, false].map(|has_core| throw(seed, has_core));
         assert!(thrown.iter().all(|thrown| thrown.most < 1.01), "{seed}");
         (solved, off) = (solved + thrown[0].solved, off + thrown[0].off);
+    }
+    for seed in 16..44 {
+        let most = [true, false].map(|has_core| throw(seed, has_core).most);
+        assert!(most.iter().all(|most| *most < 1.01), "{seed} {most:?}");
     }
     println!("{off} of {solved} solved steps leave a core off by more than 1e-9 of its length");
     assert!(solved > 500 && off < solved / 128, "{off} of {solved}");

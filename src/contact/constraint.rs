@@ -73,9 +73,11 @@ pub(crate) struct Constraint {
     /// Displacement per force that the constraint itself gives way by [m/N].
     pub compliance: f64,
     pub restitution: f64,
-    /// Motion over the step of the surface of endpoint 1 along itself, beside the endpoint's own \[m\]; of an attachment what the
-    /// arc of the rigid body's point has beyond its straight way.
+    /// Motion over the step of the surface of endpoint 1 along itself, beside the endpoint's own \[m\].
     pub surface_motion: Vec3,
+    /// Where the point of a rigid body that an attachment holds is at the start of the step \[m\]; endpoint 1 is at the middle of
+    /// its arc. The solver's.
+    pub held_point: Option<Vec3>,
     pub key: ConstraintKey,
     /// Force on endpoint 0 in the last step \[N\].
     pub warm_force: Vec3,
@@ -101,6 +103,7 @@ impl Constraint {
             compliance: 0.0,
             restitution: 0.0,
             surface_motion: Vec3::zeros(),
+            held_point: None,
             key,
             warm_force: Vec3::zeros(),
             warm_shift_rate: 0.0,

@@ -98,8 +98,9 @@ impl Island {
             if !self.contacts.is_empty() {
                 self.bodies.iter_mut().for_each(BodyProblem::update_steady);
             }
+            let bends = iteration < iterations && self.contacts.turn_arms(context);
             let done = match outcome {
-                _ if self.waits() => false,
+                _ if self.waits() || bends => false,
                 Outcome::Stalled => true,
                 Outcome::Turned => false,
                 Outcome::Descended => {

@@ -59,7 +59,7 @@ impl Island {
     pub fn step_rigid_fallbacks(&mut self, context: &SolveContext<'_>) {
         for index in 0..self.bodies.len() {
             if self.bodies[index].is_rejected {
-                self.contacts.restart(index);
+                self.contacts.restart(index, context);
                 self.bodies[index].reject_step();
             }
         }

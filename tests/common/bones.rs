@@ -36,7 +36,7 @@ pub fn distortion(body: &DeformableBody, vertices: &[usize]) -> f64 {
 pub fn energy_of_all(own: &DeformableBody, rigid: &[&RigidBody]) -> f64 {
     let weight = |body: &&RigidBody| f64::from(body.mass()) * f64::from(body.center_of_mass().y);
     let kinetic: f64 = rigid.iter().map(|body| f64::from(body.kinetic_energy())).sum();
-    let height = own.center_of_mass()[1] * own.mass() + rigid.iter().map(weight).sum::<f64>();
+    let height = rigid.iter().map(weight).sum::<f64>();
     total_energy(own) + kinetic + G * height
 }
 

@@ -167,12 +167,7 @@ impl StepScratch {
             };
             !constraint.all_endpoints().all(stays)
         });
-        let holds = |c: &&Constraint| matches!(c.key, ConstraintKey::Attachment(_) | ConstraintKey::Cable(_));
-        for endpoint in self.linking.iter().filter(holds).flat_map(Constraint::all_endpoints) {
-            if let Endpoint::Soft { body, .. } = endpoint {
-                self.works[*body].problem.iter_mut().for_each(|problem| problem.is_attached = true);
-            }
-        }
+        self.note_holds();
         for endpoint in self.linking.iter().flat_map(|constraint| &constraint.endpoints) {
             if let Endpoint::Soft { body, .. } = endpoint {
                 let nodes = endpoint.soft_nodes().map(|(node, _)| node as u32);
@@ -183,6 +178,29 @@ impl StepScratch {
             if let Endpoint::Soft { body, .. } = point.endpoint {
                 self.works[body].has_cables = true;
             }
+        }
+    }
+
+    /// Tells bodies what holds them: nodes held fast to rigid bodies that yield, and whether anything else does.
+    fn note_holds(&mut self) {
+        let proxies = &self.scene.proxies;
+        let yields = |endpoint: &Endpoint| endpoint.proxy().is_some_and(|proxy| proxies.yields(proxy));
+        let holds = |c: &&Constraint| matches!(c.key, ConstraintKey::Attachment(_) | ConstraintKey::Cable(_));
+        for constraint in self.linking.iter().filter(holds) {
+            let is_fast = constraint.is_hard_hold() && constraint.endpoints.iter().any(yields);
+            for endpoint in constraint.all_endpoints() {
+                let Endpoint::Soft { body, .. } = endpoint else { continue };
+                let Some(problem) = &mut self.works[*body].problem else { continue };
+                if is_fast {
+                    problem.held_nodes.extend(endpoint.soft_nodes().map(|(node, _)| node as u32));
+                } else {
+                    problem.is_attached = true;
+                }
+            }
+        }
+        for problem in self.works.iter_mut().filter_map(|work| work.problem.as_mut()) {
+            problem.held_nodes.sort_unstable();
+            problem.held_nodes.dedup();
         }
     }
 

@@ -51,6 +51,7 @@ impl BodyProblem {
             is_rejected: false,
             was_redone: false,
             is_attached: false,
+            held_nodes: Vec::new(),
             weight: 0.0,
             total_mass: 0.0,
             step: vec![Vec3::zeros(); n],
@@ -115,6 +116,7 @@ impl BodyProblem {
         self.is_rejected = false;
         self.was_redone = false;
         self.is_attached = false;
+        self.held_nodes.clear();
         self.begin_limits();
         self.kinetic_bound = f64::INFINITY;
         self.preconditioner.counters = SolveCounters::default();

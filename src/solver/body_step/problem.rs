@@ -101,8 +101,10 @@ pub(crate) struct BodyProblem {
     pub is_rejected: bool,
     /// Generalized-α would have made energy: implicit Euler took its place.
     pub was_redone: bool,
-    /// Attachments or cables hold it.
+    /// Cables hold it, or attachments that give way or lead to what does not yield or deforms.
     pub is_attached: bool,
+    /// Nodes that attachments hold fast to rigid bodies that yield, ascending.
+    pub held_nodes: Vec<u32>,
     /// A force that counts as large for this body \[N\].
     pub weight: f64,
     /// \[kg\]

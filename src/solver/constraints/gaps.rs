@@ -1,10 +1,8 @@
 //! Where contacts are and where they are to end.
 
 use super::context::SolveContext;
-use super::lists::Candidate;
 use super::rigid_proxy::Reaction;
-use super::system::ContactSystem;
-use crate::body::{AttachmentDirection, ConstraintKey};
+use crate::body::ConstraintKey;
 use crate::contact::{Constraint, Endpoint, Law};
 use crate::math::Vec3;
 use crate::solver::body_step::BodyProblem;
@@ -83,24 +81,5 @@ pub(super) fn motion<'a>(
             endpoint.soft_nodes().fold(Vec3::zeros(), |sum, (n, w)| sum + (x[n] - start[n]) * w)
         }
         _ => context.proxies.displacement(endpoint, reactions, context.h),
-    }
-}
-
-impl ContactSystem {
-    /// Lets attached points go along the arcs on which their rigid bodies turn, while nothing else touches the bodies: an
-    /// impact changes the turn by its own size within the step. With arcs in contact, 9 of 40 bars around rigid cores that were thrown
-    /// on a floor multiplied their energy, by up to 1e26; with arcs of any size in flight 2 of 90, by up to 318.
-    pub(super) fn follow_arcs(&mut self, context: &SolveContext<'_>) {
-        let touches = |candidate: &Candidate| matches!(candidate.constraint.law, Law::Contact { .. });
-        if self.candidates.iter().any(touches) {
-            return;
-        }
-        for Candidate { constraint, .. } in &mut self.candidates {
-            if let ConstraintKey::Attachment(axis) = &constraint.key
-                && matches!(axis.direction, AttachmentDirection::Axis(_))
-            {
-                constraint.surface_motion = context.proxies.sagitta(&constraint.endpoints[1], context.h);
-            }
-        }
     }
 }

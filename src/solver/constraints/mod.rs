@@ -16,6 +16,7 @@ mod matrix_free;
 
 mod coarse_space;
 
+mod arms;
 mod gaps;
 mod impacts;
 

@@ -4,10 +4,6 @@ use crate::contact::{Endpoint, ProxyId};
 use crate::math::{Mat3, Pose64, Vec3, rotation_from_vector, rotation_vector};
 use nalgebra::{Matrix6, Vector6};
 
-/// Turn in a step \[rad\] up to which attached points follow arcs. Of 90 bars around rigid cores that were thrown on a floor at up to
-/// 17 rad/s, with arcs of any size two made energy when their steps were rejected; those turned by 0.4 and 0.6.
-const LARGEST_ARC: f64 = 0.2;
-
 /// Linear and angular part of a motion; the linear one is of the centre of mass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Twist {
@@ -164,20 +160,12 @@ impl RigidProxies {
         Twist { linear: free.linear + gained.linear, angular: free.angular + gained.angular }
     }
 
-    /// What the arc of a yielding body's point over a step of `h` \[s\] has beyond the straight way of [`Self::displacement`], as the body
-    /// turns at its start \[m\]: towards the axis, `(ω h)² r / 2`. Zero of large turns.
-    pub fn sagitta(&self, endpoint: &Endpoint, h: f64) -> Vec3 {
-        let Endpoint::Rigid { proxy, point } = endpoint else { return Vec3::zeros() };
-        let proxy = self.get(*proxy);
-        match proxy {
-            RigidProxy::Rigid { free, .. } | RigidProxy::Link { free, .. }
-                if free.angular.norm() * h <= LARGEST_ARC =>
-            {
-                let (turn, arm) = (free.angular * h, point - proxy.com());
-                rotation_from_vector(&turn) * arm - arm - turn.cross(&arm)
-            }
-            _ => Vec3::zeros(),
-        }
+    /// Turn of a yielding body in a step of `h` \[s\] under reactions \[rad\]; `None` of others.
+    pub fn turn(&self, id: ProxyId, reactions: &[Reaction], h: f64) -> Option<Vec3> {
+        let (RigidProxy::Rigid { free, .. } | RigidProxy::Link { free, .. }) = self.get(id) else {
+            return None;
+        };
+        Some(self.end_twist(id, free, reactions).angular * h)
     }
 
     /// Where a yielding body takes its points in a step of `h` \[s\] under reactions \[m\], its turn exact; `None` of others.

@@ -223,17 +223,21 @@ impl ContactSystem {
 
     /// Begins anew with what acts on a body, and with what is between rigid bodies: without forces, and so that nothing
     /// is drawn apart.
-    pub fn restart(&mut self, index: usize) {
+    pub fn restart(&mut self, index: usize, context: &SolveContext<'_>) {
         let is_rigid = |endpoint: &Endpoint| !matches!(endpoint, Endpoint::Soft { .. });
         for contact in &mut self.active {
-            keep_together(&mut contact.constraint, index);
+            if keep_together(&mut contact.constraint, index) {
+                contact.locate(context);
+            }
             let mut endpoints = contact.constraint.all_endpoints();
             if endpoints.clone().any(|endpoint| endpoint.is_of(index)) || endpoints.all(is_rigid) {
                 self.lambda[contact.rows()].fill(0.0);
                 contact.shift = 0.0;
             }
         }
-        self.candidates.iter_mut().for_each(|candidate| keep_together(&mut candidate.constraint, index));
+        for candidate in &mut self.candidates {
+            keep_together(&mut candidate.constraint, index);
+        }
     }
 
     /// Lays the forces on the nodes; what that changes goes to the bodies' `contact_change`.
@@ -297,16 +301,17 @@ impl ContactSystem {
     }
 }
 
-/// Within what begins anew nothing is drawn apart.
-fn keep_together(constraint: &mut Constraint, index: usize) {
+/// Within what begins anew nothing is drawn apart. True if the constraint acts elsewhere than before.
+fn keep_together(constraint: &mut Constraint, index: usize) -> bool {
     let is_own = |endpoint: &Endpoint| endpoint.is_of(index);
     if constraint.compliance != 0.0 || !constraint.all_endpoints().any(is_own) {
-        return;
+        return false;
     }
+    let mut moves = false;
     if constraint.law.is_bilateral() {
         constraint.target_gap = 0.0;
-        // Of an attachment to what turns: in a straight step the other side goes straight, too.
-        constraint.surface_motion = Vec3::zeros();
+        // In a straight step the other side goes straight, too.
+        moves = constraint.straighten();
     } else {
         constraint.target_gap = constraint.target_gap.max(0.0);
     }
@@ -314,4 +319,5 @@ fn keep_together(constraint: &mut Constraint, index: usize) {
     if constraint.endpoints.iter().all(is_own) {
         constraint.compliance = WITHIN_A_SHAPE;
     }
+    moves
 }
