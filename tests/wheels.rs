@@ -168,7 +168,8 @@ fn wheels_roll_down_a_slope_as_rigid_ones_do() {
         (0..steps).for_each(|_| world.step(&mut physics));
         let found = (speed(&world) - start) / (steps as f64 * f64::from(dt));
         println!("{modulus:e} Pa, {dt:.4} s, {hub:?}: {found:.4} of {expected:.4} m/s²");
-        assert!((found / expected - 1.0).abs() < 0.05, "{found} {expected}");
+        // Each of its 96 facets takes some.
+        assert!(found > 0.92 * expected && found < 1.02 * expected, "{found} {expected}");
     }
 }
 
