@@ -179,12 +179,15 @@ fn more_random_throws_make_no_energy_and_keep_cores_rigid_in_most_steps() {
         assert!(thrown.iter().all(|thrown| thrown.most < 1.01), "{seed}");
         (solved, off) = (solved + thrown[0].solved, off + thrown[0].off);
     }
-    for seed in 16..44 {
-        let most = [true, false].map(|has_core| throw(seed, has_core).most);
-        assert!(most.iter().all(|most| *most < 1.01), "{seed} {most:?}");
-    }
     println!("{off} of {solved} solved steps leave a core off by more than 1e-9 of its length");
     assert!(solved > 500 && off < solved / 128, "{off} of {solved}");
+    for seed in 16..44 {
+        let thrown = [true, false].map(|has_core| throw(seed, has_core));
+        assert!(thrown.iter().all(|thrown| thrown.most < 1.01), "{seed}");
+        (solved, off) = (solved + thrown[0].solved, off + thrown[0].off);
+    }
+    println!("{off} of {solved} with those of 28 more");
+    assert!(off < solved / 40, "{off} of {solved}");
 }
 
 /// A hilly floor as a mesh.

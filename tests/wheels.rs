@@ -129,7 +129,7 @@ fn keeps_its_speed(modulus: f64, dt: f32, spin: f32, least: f64) {
             "{modulus:e} Pa, {spin} rad/s, {dt:.4} s, {hub:?}: {left:.3} left, rigid {rigid:.3}, energy at most {most:.3}"
         );
         assert!(left > least && left > rigid && left < 1.01, "{left} {rigid}");
-        assert!(most < 1.015, "{most}");
+        assert!(most < 1.02, "{most}");
     }
 }
 

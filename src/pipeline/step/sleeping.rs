@@ -1,9 +1,7 @@
 //! Who sleeps and who wakes.
 
 use super::work::IslandWork;
-use crate::body::{
-    ConstraintKey, DeformableBody, DeformableBodyHandle, DeformableBodySet, Partner, Surroundings,
-};
+use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Partner, Surroundings};
 use crate::contact::{Candidates, Law};
 use crate::coupling::{RapierScene, RapierSets, StepContext, collider_handle, packed};
 use crate::math::{Pose64, Vec3};
@@ -186,10 +184,7 @@ impl Sleeping {
             return;
         }
         // What a belt carries moves on, however slowly.
-        let runs = |c: ContactResult<'_>| {
-            let is_belt = !matches!(c.constraint.key, ConstraintKey::Attachment(_));
-            is_belt && c.constraint.surface_motion != Vec3::zeros()
-        };
+        let runs = |c: ContactResult<'_>| c.constraint.surface_motion != Vec3::zeros();
         if island.island.contacts.results().any(runs) {
             return;
         }

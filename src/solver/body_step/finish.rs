@@ -141,15 +141,23 @@ impl BodyProblem {
         }
     }
 
-    /// Whether velocities change by no more than twice what the rotation asks for, squared: an impact is no rotation.
+    /// Whether velocities change by no more than twice what the rotation asks for, squared, but for its fall in flight: an impact is no
+    /// rotation.
     fn only_rotates(&self, v: &[Vec3], start: &RigidMotion) -> bool {
-        let (mut changed, mut rotated) = (0.0, 0.0);
+        let (mut changed, mut fallen, mut rotated) = (0.0, 0.0, 0.0);
         for (i, m) in self.masses.iter().enumerate() {
             let own = self.v_start[i] - start.velocity;
-            changed += m * (v[i] - self.v_start[i]).norm_squared();
+            let change = v[i] - self.v_start[i];
+            changed += m * change.norm_squared();
+            fallen += m * (change - self.fall[i] * self.dt).norm_squared();
             rotated += m * (start.spin.cross(&own) * self.h).norm_squared();
         }
-        changed <= 2.0 * rotated
+        // On a floor what falls and what carries it are one.
+        let is_held_alone = |(i, f): (usize, &Vec3)| {
+            *f == Vec3::zeros() || self.held_nodes.binary_search(&(i as u32)).is_ok()
+        };
+        let flies = self.contact_force.iter().enumerate().all(is_held_alone);
+        (if flies { fallen } else { changed }) <= 2.0 * rotated
     }
 
     /// How much of a turn [rad/s] of this angular momentum may be given: no more energy than implicit Euler takes from what

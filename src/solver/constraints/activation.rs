@@ -32,7 +32,7 @@ impl ContactSystem {
         for candidate in &mut self.candidates {
             candidate.constraint.target_gap = target_gap(&candidate.constraint, context);
         }
-        self.turn_arms(context);
+        self.lay_arms(context);
         restitute(&mut self.candidates, bodies, context);
         let carries =
             |constraint: &Constraint| constraint.warm_force != Vec3::zeros() || constraint.key.is_shared();

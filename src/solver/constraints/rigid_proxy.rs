@@ -168,6 +168,14 @@ impl RigidProxies {
         Some(self.end_twist(id, free, reactions).angular * h)
     }
 
+    /// The same without reactions.
+    pub fn free_turn(&self, id: ProxyId, h: f64) -> Option<Vec3> {
+        match self.get(id) {
+            RigidProxy::Rigid { free, .. } | RigidProxy::Link { free, .. } => Some(free.angular * h),
+            RigidProxy::Prescribed { .. } => None,
+        }
+    }
+
     /// Where a yielding body takes its points in a step of `h` \[s\] under reactions \[m\], its turn exact; `None` of others.
     pub fn carries(&self, id: ProxyId, reactions: &[Reaction], h: f64) -> Option<impl Fn(&Vec3) -> Vec3> {
         let proxy = self.get(id);

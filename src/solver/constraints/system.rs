@@ -304,14 +304,16 @@ impl ContactSystem {
 /// Within what begins anew nothing is drawn apart. True if the constraint acts elsewhere than before.
 fn keep_together(constraint: &mut Constraint, index: usize) -> bool {
     let is_own = |endpoint: &Endpoint| endpoint.is_of(index);
-    if constraint.compliance != 0.0 || !constraint.all_endpoints().any(is_own) {
+    if !constraint.all_endpoints().any(is_own) {
         return false;
     }
-    let mut moves = false;
+    // In a straight step the other side goes straight, too.
+    let moves = constraint.straighten();
+    if constraint.compliance != 0.0 {
+        return moves;
+    }
     if constraint.law.is_bilateral() {
         constraint.target_gap = 0.0;
-        // In a straight step the other side goes straight, too.
-        moves = constraint.straighten();
     } else {
         constraint.target_gap = constraint.target_gap.max(0.0);
     }
