@@ -173,6 +173,39 @@ fn wheels_roll_down_a_slope_as_rigid_ones_do() {
     }
 }
 
+/// A cart on a wheel whose hub a motor turns at 10 rad/s, by an impulse joint or as a link of a multibody: it goes as fast as the rim.
+#[test]
+fn a_motor_drives_a_cart_on_a_soft_wheel() {
+    for (modulus, is_link) in [(1e7, false), (1e6, true)] {
+        let (mut physics, mut world) = (world(1.0 / 60.0), DeformableWorld::new());
+        let (body, hub) = insert(&mut world, &mut physics, Hub::Attached, modulus, 0.0);
+        // So that it hardly tilts.
+        let large = MassProperties::new(Vector::ZERO, 20.0, Vector::splat(2_000.0));
+        let cart = RigidBodyBuilder::dynamic().translation(Vector::Y * RADIUS as f32);
+        let cart = physics.insert_body(cart.additional_mass_properties(large));
+        let joint = RevoluteJointBuilder::new(Vector::Z).motor_velocity(-10.0, 200.0).motor_max_force(40.0);
+        if is_link {
+            physics.insert_multibody_joint(cart, hub, joint);
+        } else {
+            physics.insert_impulse_joint(cart, hub, joint);
+        }
+        let mut speeds = Vec::new();
+        for step in 0..150 {
+            world.step(&mut physics);
+            if step >= 120 {
+                speeds.push(f64::from(physics.bodies[cart].linvel().x));
+            }
+        }
+        let turn = -f64::from(physics.bodies[hub].angvel().z);
+        let mean = speeds.iter().sum::<f64>() / speeds.len() as f64;
+        let rolled = mean / (turn * RADIUS);
+        println!(
+            "{modulus:e} Pa, link {is_link}: hub {turn:.3} rad/s, cart {mean:.4} m/s, {rolled:.3} of the rim"
+        );
+        assert!(turn > 9.0 && turn < 10.1 && (rolled - 1.0).abs() < 0.05, "{turn} {rolled}");
+    }
+}
+
 #[test]
 fn wheels_roll_on_in_short_steps() {
     keeps_its_speed(1e5, 1.0 / 240.0, 6.0, 0.92);
