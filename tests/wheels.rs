@@ -178,7 +178,7 @@ fn wheels_roll_down_a_slope_as_rigid_ones_do() {
 fn a_motor_drives_a_cart_on_a_soft_wheel() {
     for (modulus, is_link) in [(1e7, false), (1e6, true)] {
         let (mut physics, mut world) = (world(1.0 / 60.0), DeformableWorld::new());
-        let (body, hub) = insert(&mut world, &mut physics, Hub::Attached, modulus, 0.0);
+        let (_, hub) = insert(&mut world, &mut physics, Hub::Attached, modulus, 0.0);
         // So that it hardly tilts.
         let large = MassProperties::new(Vector::ZERO, 20.0, Vector::splat(2_000.0));
         let cart = RigidBodyBuilder::dynamic().translation(Vector::Y * RADIUS as f32);
