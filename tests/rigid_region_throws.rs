@@ -17,6 +17,7 @@ fn an_insert_moves_rigidly_thrown_and_dropped() {
         let (body, bones) = world.insert_with_rigid_regions(thrown, &[(BONE, kind)], &mut physics).unwrap();
         let core = attached(&world.bodies[body]);
         let (mut worst, mut off, mut unsolved, mut left) = (0.0f64, 0.0f64, 0, 0.0f64);
+        let mut over_gyration = 0.0f64;
         let energy = |world: &DeformableWorld, physics: &PhysicsWorld| {
             energy_of_all(&world.bodies[body], &[&physics.bodies[bones[0].body]])
         };
@@ -49,15 +50,17 @@ fn an_insert_moves_rigidly_thrown_and_dropped() {
                 let at_rest = own.model().rest_position(v).map(|c| c as f32);
                 let at = pose.transform_point(Vector::from_array(at_rest)).to_array();
                 let x = own.position(v).unwrap();
-                off = (0..3).map(|k| (x[k] - f64::from(at[k])).abs() / near).fold(off, f64::max);
+                let far = (0..3).map(|k| (x[k] - f64::from(at[k])).abs()).fold(0.0, f64::max);
+                (off, over_gyration) = (off.max(far), over_gyration.max(far / near));
             }
         }
         println!(
-            "{modulus:e} Pa, {dt} s: distortion {worst:.1e}, off the bone {off:.2} of what gyration does, energy at most {most:.4} of the start, {unsolved} unsolved steps with {left:.1e}, {factorizations} factorizations"
+            "{modulus:e} Pa, {dt} s: distortion {worst:.1e}, off the bone {off:.1e} m, {over_gyration:.2} of what gyration does, energy at most {most:.4} of the start, {unsolved} unsolved steps with {left:.1e}, {factorizations} factorizations"
         );
         assert!(touched && worst < 1e-9, "{worst:e}");
         assert!(most < 1.005, "{most}");
-        assert!(off < 1.0 && unsolved <= 3, "{off:e} {unsolved}");
+        let farthest = if dt > 0.04 { 6e-3 } else { 3e-3 };
+        assert!(off < farthest && over_gyration < 1.0 && unsolved <= 3, "{off:e} {over_gyration} {unsolved}");
         all_unsolved += unsolved;
     }
     assert!(all_unsolved <= 6, "{all_unsolved}");

@@ -15,6 +15,9 @@ const MAX_SPIN_GIVEN: f64 = 0.5;
 /// Part of the spin [1/s] whose loss is not given back to what touches.
 const NEGLIGIBLE_LOSS: f64 = 0.02;
 
+/// Change of velocities, squared, over that of a rotation alone, up to which a held body only rotates: an impact changes them by more.
+const ONLY_ROTATES: f64 = 2.0;
+
 impl BodyProblem {
     /// Moves and turns a free body as a rigid one, so that its residual has neither force nor
     /// moment: what is left of it after a few iterations would set the body spinning. Deforms nothing.
@@ -141,8 +144,7 @@ impl BodyProblem {
         }
     }
 
-    /// Whether velocities change by no more than twice what the rotation asks for, squared, but for its fall in flight: an impact is no
-    /// rotation.
+    /// Whether velocities change by little more than the rotation asks for, in flight without the fall.
     fn only_rotates(&self, v: &[Vec3], start: &RigidMotion) -> bool {
         let (mut changed, mut fallen, mut rotated) = (0.0, 0.0, 0.0);
         for (i, m) in self.masses.iter().enumerate() {
@@ -157,7 +159,7 @@ impl BodyProblem {
             *f == Vec3::zeros() || self.held_nodes.binary_search(&(i as u32)).is_ok()
         };
         let flies = self.contact_force.iter().enumerate().all(is_held_alone);
-        (if flies { fallen } else { changed }) <= 2.0 * rotated
+        (if flies { fallen } else { changed }) <= ONLY_ROTATES * rotated
     }
 
     /// How much of a turn [rad/s] of this angular momentum may be given: no more energy than implicit Euler takes from what

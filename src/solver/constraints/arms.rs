@@ -16,8 +16,8 @@ use crate::math::{Vec3, rotation_from_vector};
 
 /// Turn \[rad\] in a step below which points go straight: their arcs differ by half its square.
 const STRAIGHT: f64 = 1.0e-5;
-/// Turn \[rad\] above which arms are not laid: points go straight at the start of a step, and keep their arms within it; of 80 bars thrown around rigid cores and between blocks, one of 1 rad a step made
-/// 1.2 times its energy with arms at any turn.
+/// Turn \[rad\] in a step above which arms are not laid anew: points go straight, or keep the arms that they have. Of 80 bars thrown around rigid
+/// cores and between blocks one made 1.2 times its energy with arms at any turn.
 const LARGEST: f64 = 0.5;
 /// What an arm may be off by for where the step ends, in radii over turns: at 1e-4 cores of 1e9 Pa are off their places by more than may be made
 /// good, in 3.5 % of the steps of throws, at 1e-6 in 1.1 %, at 1e-7 as many.
