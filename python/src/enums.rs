@@ -141,7 +141,7 @@ choices! {
 choices! {
     /// How the elasticity of a body is solved.
     PySolver = "Solver" of Solver {
-        /// Projective Dynamics, the default of solids and large sheets.
+        /// Projective Dynamics, the default of solids.
         Projective = "PROJECTIVE",
         /// The same matrix by conjugate gradients.
         ConjugateGradients = "CONJUGATE_GRADIENTS",
@@ -153,6 +153,8 @@ choices! {
         Jacobi = "JACOBI",
         /// Newton's method, the default of ropes and small sheets.
         Newton = "NEWTON",
+        /// Newton's method for what hangs untouched, else Projective Dynamics: the default of large sheets.
+        Automatic = "AUTOMATIC",
     }
 }
 

@@ -240,7 +240,7 @@ def test_a_hard_limit_holds():
 
 def test_every_solver_can_be_asked_for():
     world = f.World(gravity=(0, 0, 0))
-    for k, solver in enumerate((f.Solver.PROJECTIVE, f.Solver.CONJUGATE_GRADIENTS, f.Solver.GAUSS_SEIDEL, f.Solver.XPBD, f.Solver.JACOBI, f.Solver.NEWTON)):
+    for k, solver in enumerate((f.Solver.PROJECTIVE, f.Solver.CONJUGATE_GRADIENTS, f.Solver.GAUSS_SEIDEL, f.Solver.XPBD, f.Solver.JACOBI, f.Solver.NEWTON, f.Solver.AUTOMATIC)):
         cube = f.DeformableBody.cuboid((0.1, 0.1, 0.1), (2, 2, 2), solver=solver, translation=(k, 0, 0), linvel=(0, 1, 0))
         body = world.deformable_bodies[world.add_deformable(cube)]
         world.step(6)

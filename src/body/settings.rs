@@ -29,6 +29,10 @@ pub enum Solver {
     /// Newton's method: the second derivatives of the energy itself, factored anew in every iteration. The
     /// reference, and right for ropes and stiff cloth.
     Newton,
+    /// [`Solver::Newton`] while the body hangs by pins and hard attachments and nothing touches it, an iteration in the place of ten;
+    /// else [`Solver::Projective`]: in contact so few end unsolved. The default of sheets of more than 256 vertices: what hangs comes
+    /// to rest where it should, at 1.5 times the price of the constant matrix with 441 vertices, 3 times with 1681, 5 times with 10 000.
+    Automatic,
 }
 
 /// In which rotating frames the rest stiffness is applied.
@@ -154,7 +158,12 @@ impl Build {
         match self {
             Self::Solid => defaults,
             // Their largest force is at the pins, hundreds of times that on other nodes.
-            Self::Sheet => SolverSettings { system: SystemMatrix::Laplacian, tolerance: 1.0e-3, ..defaults },
+            Self::Sheet => SolverSettings {
+                solver: Solver::Automatic,
+                system: SystemMatrix::Laplacian,
+                tolerance: 1.0e-3,
+                ..defaults
+            },
             // The constant matrix leaves stiff ones swaying for half a minute, and rejects what lies on a floor in every step.
             Self::SmallSheet => SolverSettings { solver: Solver::Newton, max_iterations: 3, ..defaults },
             Self::Rope => SolverSettings { solver: Solver::Newton, ..defaults },
@@ -273,7 +282,22 @@ impl Default for SolverSettings {
     }
 }
 
+/// Iterations of the constant matrix in the place of which [`Solver::Automatic`] takes one of Newton's method.
+const ITERATIONS_OF_NEWTON: usize = 10;
+
 impl SolverSettings {
+    /// With what a step of a body is solved that hangs and is not touched, or any other.
+    pub(crate) fn of_step(self, hangs: bool) -> Self {
+        match self.solver {
+            Solver::Automatic if hangs => {
+                let iterations = self.max_iterations.div_ceil(ITERATIONS_OF_NEWTON);
+                self.solver(Solver::Newton).max_iterations(iterations)
+            }
+            Solver::Automatic => self.solver(Solver::Projective),
+            _ => self,
+        }
+    }
+
     /// Exactly this many iterations, unless nothing but rounding is left before.
     #[must_use]
     pub fn iterations(count: usize) -> Self {

@@ -132,9 +132,10 @@ impl DeformablePipeline {
         for (_, body) in deformables.iter().filter(|(_, b)| b.is_enabled()) {
             let near = body.matrix_step(h);
             self.scratch.factors.prepare_surface(&FactorKey::new(body, near), body);
-            if body.settings().integrator == Integrator::Bdf2 {
-                let key = FactorKey::new(body, SECOND_ORDER * near);
-                self.scratch.factors.prepare(&key, body, 1, std::iter::empty());
+            let is_second_order = body.settings().integrator == Integrator::Bdf2;
+            let flies = FactorKey::untouched(body, if is_second_order { SECOND_ORDER * near } else { near });
+            self.scratch.factors.prepare(&flies, body, 1, std::iter::empty());
+            if is_second_order {
                 self.scratch.factors.prepare_surface(&FactorKey::new(body, alpha_step(near)), body);
             }
         }

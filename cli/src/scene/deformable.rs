@@ -275,6 +275,8 @@ pub enum SolverKind {
     Jacobi,
     /// Newton's method.
     Newton,
+    /// Newton's method for what hangs untouched, else Projective Dynamics.
+    Automatic,
 }
 
 /// Constant matrices.

@@ -155,6 +155,7 @@ fn solved_by(builder: DeformableBodyBuilder, asked: &scene::Solver) -> Deformabl
                 scene::SolverKind::Xpbd => Solver::Xpbd,
                 scene::SolverKind::Jacobi => Solver::Jacobi,
                 scene::SolverKind::Newton => Solver::Newton,
+                scene::SolverKind::Automatic => Solver::Automatic,
             };
         }
         if let Some(system) = asked.system {

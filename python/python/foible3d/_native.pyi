@@ -125,6 +125,7 @@ class Solver(_Choice):
     XPBD: Solver
     JACOBI: Solver
     NEWTON: Solver
+    AUTOMATIC: Solver
 
 @final
 class Integrator(_Choice):

@@ -8,15 +8,19 @@ use crate::coupling::StepContext;
 use crate::solver::STEPS_KEPT;
 
 impl StepScratch {
-    /// Bodies that are touched go on by implicit Euler.
+    /// Bodies that are held or touched go on otherwise than those in flight.
     pub(super) fn choose_integration_order(
         &mut self,
         deformables: &DeformableBodySet,
         context: &StepContext<'_>,
     ) {
-        for work in self.works.iter_mut().filter(|work| work.is_touched()) {
+        for work in &mut self.works {
+            let is_touched = work.is_touched();
+            if !is_touched && work.prescribed.is_empty() {
+                continue;
+            }
             if let Some(problem) = &mut work.problem {
-                problem.begin_in_contact(&deformables[work.handle], &context.gravity);
+                problem.begin_held(&deformables[work.handle], is_touched, &context.gravity);
             }
         }
     }

@@ -289,10 +289,9 @@ impl BodyWork {
         }
     }
 
-    /// Whether anything may touch the body in this step, or holds it.
+    /// Whether anything may touch the body in this step, or holds it, other than pins and hard attachments to what does not yield.
     pub fn is_touched(&self) -> bool {
-        self.has_cables
-            || !(self.constraints.is_empty() && self.linked_nodes.is_empty() && self.prescribed.is_empty())
+        self.has_cables || !(self.constraints.is_empty() && self.linked_nodes.is_empty())
     }
 
     /// Tells where the body's factor is kept in this step.

@@ -2,7 +2,7 @@
 
 use super::generalized_alpha::{SCALE, alpha_step};
 use super::problem::{BodyProblem, Iterate, SECOND_ORDER, Scheme};
-use crate::body::{DeformableBody, Integrator, PrescribedNode};
+use crate::body::{DeformableBody, Integrator, PrescribedNode, SolverSettings};
 use crate::fem::StiffnessDamping;
 use crate::math::{Mat3, Vec3};
 use crate::solver::counters::SolveCounters;
@@ -18,6 +18,7 @@ impl BodyProblem {
             has_columns: false,
             model: body.model.clone(),
             settings: *body.settings(),
+            is_touched: false,
             materials: body.materials.clone(),
             mass_damping: 0.0,
             activations: body.activations.clone(),
@@ -81,18 +82,27 @@ impl BodyProblem {
             _ => Scheme::ImplicitEuler,
         };
         self.dt = h;
+        self.is_touched = false;
         self.read_body(body, gravity);
     }
 
-    /// Begins again where anything may touch the body: by generalized-α, if it is of the second order.
-    pub fn begin_in_contact(&mut self, body: &DeformableBody, gravity: &Vec3) {
+    /// Begins again where the body is held, or may be touched: by generalized-α, if it is of the second order, and where it is touched
+    /// with what then solves it.
+    pub fn begin_held(&mut self, body: &DeformableBody, is_touched: bool, gravity: &Vec3) {
+        let before = (self.scheme, self.settings.solver);
         if self.settings.integrator == Integrator::Bdf2 {
             let goes = self.goes_by_alpha(body, gravity);
-            let scheme = if goes { Scheme::GeneralizedAlpha } else { Scheme::ImplicitEuler };
-            if scheme != std::mem::replace(&mut self.scheme, scheme) {
-                self.read_body(body, gravity);
-            }
+            self.scheme = if goes { Scheme::GeneralizedAlpha } else { Scheme::ImplicitEuler };
         }
+        self.is_touched = is_touched;
+        if before != (self.scheme, self.settings_of(body).solver) {
+            self.read_body(body, gravity);
+        }
+    }
+
+    fn settings_of(&self, body: &DeformableBody) -> SolverSettings {
+        let is_pinned = !(body.pins.is_empty() && self.prescribed.is_empty());
+        body.settings().of_step(is_pinned && !self.is_touched)
     }
 
     fn read_body(&mut self, body: &DeformableBody, gravity: &Vec3) {
@@ -104,8 +114,8 @@ impl BodyProblem {
         let near = step(body.matrix_step(self.dt));
         self.h = step(self.dt);
         (self.reach, self.scale) = if self.is_alpha() { (self.dt, SCALE) } else { (self.h, 1.0) };
-        self.key.update(body, near, self.prescribed.iter().map(|p| p.node));
-        self.settings = *body.settings();
+        self.settings = self.settings_of(body);
+        self.key.update(body, self.settings.solver, near, self.prescribed.iter().map(|p| p.node));
         self.materials.clone_from(&body.materials);
         self.mass_damping = body.model.mass_damping(&body.materials);
         self.activations.clone_from(&body.activations);

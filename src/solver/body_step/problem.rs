@@ -52,7 +52,10 @@ pub(crate) struct BodyProblem {
     /// Whether that holds the columns that the contacts want.
     pub has_columns: bool,
     pub model: Arc<DeformableModel>,
+    /// What the step is solved with.
     pub settings: SolverSettings,
+    /// Whether more than pins and hard attachments may hold the body.
+    pub(super) is_touched: bool,
     pub(super) materials: Vec<DeformableMaterial>,
     /// α [1/s].
     pub(super) mass_damping: f64,

@@ -345,8 +345,8 @@ impl FactorCache {
                 if is_single { factor.rounded() } else { factor }
             }
             Solver::GaussSeidel => Factor::GaussSeidel(values),
-            // Newton's method makes its own, and falls back on this.
-            Solver::Jacobi | Solver::Newton | Solver::Xpbd => {
+            // Newton's method makes its own, and falls back on this. A step has chosen which it is before it asks.
+            Solver::Jacobi | Solver::Newton | Solver::Xpbd | Solver::Automatic => {
                 Factor::Jacobi(symbolic.upper(&values).inverse_row_sums())
             }
         };

@@ -58,6 +58,7 @@ impl MaterialKey {
 }
 
 impl FactorKey {
+    /// Of a body that is touched, at a step of `h` \[s\].
     pub fn new(body: &DeformableBody, h: f64) -> Self {
         let mut key = Self {
             model: body.model.id,
@@ -70,7 +71,15 @@ impl FactorKey {
             pins: Vec::new(),
             base: Vec::new(),
         };
-        key.update(body, h, std::iter::empty());
+        key.update(body, body.settings().of_step(false).solver, h, std::iter::empty());
+        key
+    }
+
+    /// As [`FactorKey::new`], of a body that nothing touches, and that hangs if it is pinned.
+    pub fn untouched(body: &DeformableBody, h: f64) -> Self {
+        let mut key = Self::new(body, h);
+        let hangs = !key.pins.is_empty();
+        key.update(body, body.settings().of_step(hangs).solver, h, std::iter::empty());
         key
     }
 
@@ -93,10 +102,16 @@ impl FactorKey {
         Self { pins: self.base.clone(), ..self.clone() }
     }
 
-    /// The key of a body at a step of `h` \[s\] with further nodes pinned, in the memory of another.
-    pub fn update(&mut self, body: &DeformableBody, h: f64, further: impl Iterator<Item = u32>) {
+    /// The key of a body at a step of `h` \[s\] that is solved so, with further nodes pinned, in the memory of another.
+    pub fn update(
+        &mut self,
+        body: &DeformableBody,
+        solver: Solver,
+        h: f64,
+        further: impl Iterator<Item = u32>,
+    ) {
         self.model = body.model.id;
-        self.solver = body.settings().solver;
+        self.solver = solver;
         self.system = match self.solver {
             Solver::Newton => SystemMatrix::RestStiffness,
             Solver::Xpbd => SystemMatrix::Laplacian,
