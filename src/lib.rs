@@ -94,7 +94,9 @@ mod export;
 
 mod touch;
 
-pub use adjoint::{DeformableGradient, DeformableLoss, DeformableTape, MaterialGradient, StepGradient};
+pub use adjoint::{
+    CableGradient, DeformableGradient, DeformableLoss, DeformableTape, MaterialGradient, StepGradient,
+};
 pub use body::{
     Acceleration, AttachTo, CablePoint, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
     DeformableBodyBuilder, DeformableBodyHandle, DeformableBodySet, DeformableCable, DeformableCableBuilder,

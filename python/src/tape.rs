@@ -2,14 +2,14 @@
 
 use crate::arrays::{Array1, Array2, Triple, count, grid, image, points, rows, triple};
 use crate::errors::{Failure, bad_value, without_panic};
-use crate::handles::{PyColliderHandle, PyDeformableHandle};
+use crate::handles::{PyCableHandle, PyColliderHandle, PyDeformableHandle};
 use crate::world::{World, in_turns};
-use foible3d::{DeformableGradient, DeformableTape, MaterialGradient, StepGradient};
+use foible3d::{CableGradient, DeformableGradient, DeformableTape, MaterialGradient, StepGradient};
 use numpy::{PyArray1, PyArray3};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Steps of one body of a world, recorded so that the derivatives of a loss with respect to what the body is made of, how it began and
@@ -123,20 +123,24 @@ impl PyTape {
 
     /// The derivatives of a loss, given by its own with respect to what it looks at: `positions` [1/m] and `velocities` [s/m] of the vertices at the
     /// end of steps, dicts of arrays of shape (n, 3) by the number of the step, from the end if negative; `contact_forces` [1/N], a dict of
-    /// three numbers by pairs of a step and the handle of a collider.
-    #[pyo3(signature = (positions = None, velocities = None, contact_forces = None))]
+    /// three numbers by pairs of a step and the handle of a collider; `tensions` [1/N], a dict of numbers by pairs of a step and the handle of a cable.
+    #[pyo3(signature = (positions = None, velocities = None, contact_forces = None, tensions = None))]
     fn backward(
         &self,
         py: Python<'_>,
         positions: Option<BTreeMap<isize, Bound<'_, PyAny>>>,
         velocities: Option<BTreeMap<isize, Bound<'_, PyAny>>>,
         contact_forces: Option<HashMap<(isize, PyColliderHandle), Triple>>,
+        tensions: Option<HashMap<(isize, PyCableHandle), f64>>,
     ) -> PyResult<PyGradient> {
         let (positions, velocities) =
             (self.by_step(py, positions, "positions")?, self.by_step(py, velocities, "velocities")?);
         let forces = contact_forces.unwrap_or_default().into_iter();
         let forces = forces.map(|((step, collider), of)| Ok((self.place(py, step)?, collider.0, of.0)));
         let forces = forces.collect::<PyResult<Vec<_>>>()?;
+        let tensions = tensions.unwrap_or_default().into_iter();
+        let tensions = tensions.map(|((step, cable), of)| Ok((self.place(py, step)?, cable.0, of)));
+        let tensions = tensions.collect::<PyResult<Vec<_>>>()?;
         let gradient = py.detach(|| {
             without_panic(|| {
                 let tape = self.lock_detached();
@@ -149,6 +153,9 @@ impl PyTape {
                 }
                 for (step, collider, of) in &forces {
                     loss.add_contact_force(*step, *collider, *of)?;
+                }
+                for (step, cable, of) in &tensions {
+                    loss.add_tension(*step, *cable, *of)?;
                 }
                 tape.backward(&loss).map_err(Failure::from)
             })
@@ -184,6 +191,22 @@ impl PyGradient {
         let columns = self.0.steps.first().map_or(0, |step| of(step).len());
         let flat = self.0.steps.iter().flat_map(|step| of(step).iter().copied()).collect();
         image(py, [self.0.steps.len(), columns], flat)
+    }
+
+    /// The cables through the body in any step, oldest first.
+    fn all_cables(&self) -> Vec<PyCableHandle> {
+        let all = self.0.steps.iter().flat_map(|step| &step.cables).map(|of| of.cable);
+        all.collect::<BTreeSet<_>>().into_iter().map(PyCableHandle).collect()
+    }
+
+    fn by_cable<'py>(&self, py: Python<'py>, of: impl Fn(&CableGradient) -> f64) -> PyResult<Array2<'py>> {
+        let cables = self.all_cables();
+        let in_step = |step: &StepGradient, cable: &PyCableHandle| {
+            step.cables.iter().find(|own| own.cable == cable.0).map_or(0.0, &of)
+        };
+        let steps = self.0.steps.iter();
+        let flat = steps.flat_map(|step| cables.iter().map(move |cable| in_step(step, cable))).collect();
+        image(py, [self.0.steps.len(), cables.len()], flat)
     }
 
     fn by_region<'py>(&self, py: Python<'py>, of: impl Fn(&MaterialGradient) -> f64) -> Array1<'py> {
@@ -263,6 +286,25 @@ impl PyGradient {
     #[getter]
     fn rolls<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
         self.table(py, |step| &step.rolls)
+    }
+
+    /// Handles of the cables through the body, oldest first: the columns of the next two.
+    #[getter]
+    fn cables(&self) -> Vec<PyCableHandle> {
+        self.all_cables()
+    }
+
+    /// Per newton of a tension that was given to each cable in each step, an array of shape (steps, k); zero of others.
+    #[getter]
+    fn cable_tensions<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
+        self.by_cable(py, |of| of.tension)
+    }
+
+    /// Per metre of the length without tension that was off the winch of each cable at the end of each step (``Cable.free_length``), an array of
+    /// shape (steps, k), where that was held and the cable taut; zero of others.
+    #[getter]
+    fn cable_lengths<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
+        self.by_cable(py, |of| of.length)
     }
 
     fn __repr__(&self) -> String {

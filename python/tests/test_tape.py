@@ -75,6 +75,29 @@ def test_contact_forces_have_gradients():
     assert isinstance(gradient.friction, float)
 
 
+def test_cables_have_gradients():
+    def pull(tension=None, length=None):
+        world, body, tape, tip, _ = swing(push=0.0)
+        points = [f.CablePoint.inside(body.handle, at) for at in [(0.2, 0.05, 0.01), (0.0, 0.05, 0.01)]]
+        points.append(f.CablePoint.world((-0.5, 0.1, 0.0)))
+        cable = world.add_cable(points, tension=tension, length=length, compliance=1e-3)
+        tape.step(STEPS)
+        return body.positions[tip, 1] + 0.01 * world.cables[cable].tension, body, tape, tip, cable
+
+    for options, column in [({"tension": 4.0}, "cable_tensions"), ({"length": 0.69}, "cable_lengths")]:
+        _, body, tape, tip, cable = pull(**options)
+        of_positions = np.zeros((body.vertex_count, 3))
+        of_positions[tip, 1] = 1.0
+        gradient = tape.backward(positions={-1: of_positions}, tensions={(-1, cable): 0.01})
+        ((name, at),) = options.items()
+        by = 1e-3 * at
+        slope = (pull(**{name: at + by})[0] - pull(**{name: at - by})[0]) / (2 * by)
+        assert gradient.cables == [cable] and getattr(gradient, column).shape == (STEPS, 1)
+        assert getattr(gradient, column).sum() == pytest.approx(slope, rel=1e-3), name
+    other = {"cable_tensions": "cable_lengths", "cable_lengths": "cable_tensions"}[column]
+    assert np.abs(getattr(gradient, other)).max() == 0.0
+
+
 def test_what_has_no_gradient_is_refused():
     world, body, tape, _, _ = swing()
     tape.step(3)

@@ -3,13 +3,16 @@
 //! The end solves `F₁ = r(x′) + Jᵀλ = 0` and the laws of the contacts that bind, `F₂ = 0`. With `g = ∂L/∂x′ + ∂L/∂v′/h` and
 //! `H = −∂r/∂x′`, the adjoint z, q of section 14 of docs/method.md gives `dL/dθ = z·∂F₁/∂θ + q·∂F₂/∂θ`.
 
+use super::cables::{CableRecord, OfCable, along};
 use super::contact_rows::ContactRows;
 use super::filled_rooms::of_pressures;
-use super::gradient::{DeformableGradient, StepGradient};
+use super::gradient::{CableGradient, DeformableGradient, StepGradient};
+use super::loss::Seed;
 use super::parameters::{ElasticWork, Inertia};
 use super::record::{ContactRecord, StepRecord};
 use super::spin::{Cotangents, through_spin};
 use super::tangent::Tangent;
+use crate::body::DeformableCableHandle;
 use crate::fem::DeformableModel;
 use crate::math::Vec3;
 
@@ -18,9 +21,30 @@ pub(super) struct Backward<'a> {
     model: &'a DeformableModel,
     tangent: Tangent,
     force: Vec<Vec3>,
-    /// With respect to the state between two steps.
+    /// With respect to the state between two steps: positions, velocities, and tensions of cables.
     pub x: Vec<Vec3>,
     pub v: Vec<Vec3>,
+    tensions: Vec<(DeformableCableHandle, f64)>,
+}
+
+/// Derivatives of a loss with respect to the forces of a step: of colliders, and of its cables.
+pub(super) struct OfForces<'a> {
+    colliders: &'a [(u64, Vec3)],
+    tensions: Vec<f64>,
+}
+
+impl OfForces<'_> {
+    /// Of the force of a collider on the body.
+    pub fn of_collider(&self, collider: u64) -> Vec3 {
+        self.colliders.iter().filter(|(own, _)| *own == collider).map(|(_, derivative)| *derivative).sum()
+    }
+}
+
+/// The adjoint of a step, and what it says of pins and cables.
+struct Solved {
+    z: Vec<Vec3>,
+    of_pins: Vec<Vec3>,
+    cables: Vec<OfCable>,
 }
 
 impl<'a> Backward<'a> {
@@ -28,17 +52,17 @@ impl<'a> Backward<'a> {
     pub fn new(model: &'a DeformableModel) -> Option<Self> {
         let zeros = vec![Vec3::zeros(); model.rest.len()];
         let tangent = Tangent::new(model)?;
-        Some(Self { model, tangent, force: Vec::new(), x: zeros.clone(), v: zeros })
+        Some(Self { model, tangent, force: Vec::new(), x: zeros.clone(), v: zeros, tensions: Vec::new() })
     }
 
-    /// Goes through a step, with what the loss says of the forces of colliders in it.
+    /// Goes through a step, with what the loss says of the forces in it.
     ///
     /// # Errors
     /// Why there is no gradient.
     pub fn step(
         &mut self,
         record: &StepRecord,
-        of_colliders: &[(u64, Vec3)],
+        seed: &Seed,
         out: &mut DeformableGradient,
     ) -> Result<(), &'static str> {
         let (model, h) = (self.model, record.h);
@@ -49,7 +73,10 @@ impl<'a> Backward<'a> {
         }
         let g: Vec<Vec3> = of.x_end.iter().zip(&of.v_end).map(|(x, v)| x + v / h).collect();
         of.x_start.iter_mut().zip(&of.v_end).for_each(|(x, v)| *x -= v / h);
-        let (z, of_pins) = self.solve(record, &inertia, of_colliders, g, &mut of)?;
+        let of_forces = self.of_forces(record, seed);
+        let Solved { z, of_pins, cables } = self.solve(record, &inertia, &of_forces, g, &mut of)?;
+        self.tensions =
+            record.cables.iter().zip(&cables).map(|(cable, of)| (cable.handle, of.lagged)).collect();
         out.friction += of.friction;
         add_inertia(record, &inertia, &z, &mut of);
         let mut work = ElasticWork { model, record, z: &z, force: &mut self.force };
@@ -65,6 +92,7 @@ impl<'a> Backward<'a> {
             activation,
             pressures: of_pressures(&self.tangent.rooms, model.cavities.len(), &z),
             rolls: of_rolls(model, record, &z),
+            cables: record.cables.iter().zip(&cables).map(cable_gradient).collect(),
             velocities: users(&of.v_start),
         });
         (self.x, self.v) = (of.x_start, of.v_start);
@@ -76,10 +104,10 @@ impl<'a> Backward<'a> {
         &mut self,
         record: &StepRecord,
         inertia: &Inertia,
-        of_colliders: &[(u64, Vec3)],
+        of_forces: &OfForces<'_>,
         mut g: Vec<Vec3>,
         of: &mut Cotangents,
-    ) -> Result<(Vec<Vec3>, Vec<Vec3>), &'static str> {
+    ) -> Result<Solved, &'static str> {
         let (stuck, others) = stuck_contacts(record);
         let mut fixed = record.pins.clone();
         fixed.extend(stuck.iter().map(|(node, _)| *node as u32));
@@ -94,18 +122,24 @@ impl<'a> Backward<'a> {
         }
         let mut z_stuck = vec![Vec3::zeros(); g.len()];
         for (node, contact) in &stuck {
-            let own = of_colliders.iter().filter(|(collider, _)| *collider == contact.collider);
-            z_stuck[*node] = -own.map(|(_, derivative)| *derivative).sum::<Vec3>();
+            z_stuck[*node] = -of_forces.of_collider(contact.collider);
         }
         self.tangent.take_off_free(&z_stuck, &is_free, &mut g);
-        let rows = ContactRows::new(&others);
-        let share = rows.solve(&mut self.tangent, &is_free, of_colliders, &mut g);
+        let mut rows = ContactRows::new(&others, of_forces);
+        for (cable, of_tension) in record.cables.iter().zip(&of_forces.tensions) {
+            if let Some(compliance) = cable.compliance() {
+                let force = cable.force();
+                let of_tension = of_tension + along(&force, &z_stuck);
+                rows.add_cable(force, compliance, of_tension);
+            }
+        }
+        let share = rows.solve(&mut self.tangent, &is_free, &mut g);
         let (share, mut z) = (share.ok_or("its contacts say too little or too much")?, g);
         stuck.iter().for_each(|(node, _)| z[*node] = z_stuck[*node]);
         self.tangent.take_off_pinned(&z, &mut of_fixed);
         let held = (1.0 / record.h + inertia.damping) / record.h;
         for (node, contact) in stuck {
-            let carried = of_fixed[node] - z[node] * (held * inertia.masses[node]);
+            let carried = of_fixed[node] + share.of_end[node] - z[node] * (held * inertia.masses[node]);
             let normal = contact.frame[0];
             let along = normal * normal.dot(&carried);
             of.x_start[node] += if contact.recovers { carried } else { carried - along };
@@ -116,8 +150,27 @@ impl<'a> Backward<'a> {
         }
         of.x_start.iter_mut().zip(&share.of_start).for_each(|(x, c)| *x += c);
         of.friction = share.of_friction;
-        Ok((z, of_pins))
+        let mut lengths = share.of_cables.iter();
+        let cables = record.cables.iter().zip(&of_forces.tensions).map(|(cable, of_tension)| {
+            let q = cable.compliance().and_then(|_| lengths.next().copied()).unwrap_or(0.0);
+            cable.back(&z, q, *of_tension, &mut of.x_start)
+        });
+        let cables = cables.collect();
+        Ok(Solved { z, of_pins, cables })
     }
+
+    /// What the loss says of forces, and later steps of the tensions of cables.
+    fn of_forces<'b>(&self, record: &StepRecord, seed: &'b Seed) -> OfForces<'b> {
+        let of_tension = |cable: &CableRecord| {
+            let both = seed.tensions.iter().chain(&self.tensions);
+            both.filter(|(handle, _)| *handle == cable.handle).map(|(_, of)| of).sum()
+        };
+        OfForces { colliders: &seed.contact_forces, tensions: record.cables.iter().map(of_tension).collect() }
+    }
+}
+
+fn cable_gradient((cable, of): (&CableRecord, &OfCable)) -> CableGradient {
+    CableGradient { cable: cable.handle, tension: of.tension, length: of.length }
 }
 
 /// What z says of the roll of each rod of a model.

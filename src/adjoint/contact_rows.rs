@@ -5,12 +5,15 @@
 //! - if it sticks `t·(x′ − xₙ) = 0` for both tangents (beside what its partner moves),
 //! - if it slides `s (λ_t + μ λ_n û) = 0` with `û = u/|u|` and the constant `s = |u|/(μ λ_n)`, which makes metres of it.
 //!
+//! A cable that is held at a length has one row more (`src/adjoint/cables.rs`).
+//!
 //! A node that sticks with its one contact moves by nothing but its partner: it is taken out of the unknowns as a pinned one is.
 //!
 //! With `C = ∂F₂/∂x′` and `D = ∂F₂/∂λ` the adjoint is `H z = g + Cᵀq`, `(J H⁻¹ Cᵀ + Dᵀ) q = −g_λ − J H⁻¹ g`. Normals, and the
 //! weights of points within triangles and edges, count as constant.
 
-use super::record::ContactRecord;
+use super::backward::OfForces;
+use super::record::{ContactRecord, NodeVectors};
 use super::tangent::Tangent;
 use crate::math::Vec3;
 use nalgebra::{DMatrix, DVector};
@@ -21,10 +24,11 @@ const REDUNDANT: f64 = 1.0e-11;
 const LEFT: f64 = 1.0e-8;
 
 /// A row: what its force acts along, and what its law looks along.
-struct Row<'a> {
-    contact: &'a ContactRecord,
-    acts: Vec3,
-    looks: Vec3,
+struct Row {
+    acts: NodeVectors,
+    looks: NodeVectors,
+    /// Derivative of the loss with respect to its force.
+    of_force: f64,
     /// Derivative of the law with respect to the position at the start, along what it looks along.
     of_start: f64,
     /// Derivative of the law with respect to the coefficient of friction.
@@ -32,8 +36,10 @@ struct Row<'a> {
 }
 
 /// The rows of a step.
-pub(super) struct ContactRows<'a> {
-    rows: Vec<Row<'a>>,
+pub(super) struct ContactRows {
+    rows: Vec<Row>,
+    /// The first that is a cable's.
+    cables_from: usize,
     /// D, by rows of the law and of the force.
     of_forces: DMatrix<f64>,
 }
@@ -45,26 +51,38 @@ pub(super) struct ContactShare {
     pub of_end: Vec<Vec3>,
     pub of_start: Vec<Vec3>,
     pub of_friction: f64,
+    /// Of the lengths of cables.
+    pub of_cables: Vec<f64>,
 }
 
-impl<'a> ContactRows<'a> {
-    pub fn new(contacts: &[&'a ContactRecord]) -> Self {
+impl ContactRows {
+    pub fn new(contacts: &[&ContactRecord], of: &OfForces<'_>) -> Self {
         let count = contacts.iter().map(|contact| contact.dimension()).sum();
         let (mut rows, mut of_forces) = (Vec::with_capacity(count), DMatrix::zeros(count, count));
         for &contact in contacts {
             let first = rows.len();
             let [normal, tangents @ ..] = contact.frame;
             let of_start = if contact.recovers { -1.0 } else { 0.0 };
-            rows.push(Row { contact, acts: normal, looks: normal, of_start, of_friction: 0.0 });
+            let of_contact = of.of_collider(contact.collider);
+            let laid = |direction: Vec3| -> NodeVectors {
+                contact.weighted_nodes().map(|(node, weight)| (node, direction * weight)).collect()
+            };
+            let row = |direction: Vec3, of_start: f64| Row {
+                acts: laid(direction),
+                looks: laid(direction),
+                of_force: of_contact.dot(&direction),
+                of_start,
+                of_friction: 0.0,
+            };
+            rows.push(row(normal, of_start));
             for tangent in tangents.into_iter().take(contact.dimension() - 1) {
-                let mut row =
-                    Row { contact, acts: tangent, looks: tangent, of_start: -1.0, of_friction: 0.0 };
+                let mut row = row(tangent, -1.0);
                 if let Some(slip) = contact.slip {
                     let (length, pressed) = (slip.norm(), normal.dot(&contact.force));
                     let direction = slip / length;
                     let along = direction.dot(&tangent);
                     let scale = length / (contact.friction * pressed);
-                    row.looks = tangent - direction * along;
+                    row.looks = laid(tangent - direction * along);
                     row.of_friction = scale * pressed * along;
                     of_forces[(rows.len(), first)] = scale * contact.friction * along;
                     of_forces[(rows.len(), rows.len())] = scale;
@@ -72,18 +90,19 @@ impl<'a> ContactRows<'a> {
                 rows.push(row);
             }
         }
-        Self { rows, of_forces }
+        Self { cables_from: rows.len(), rows, of_forces }
     }
 
-    /// Solves for z in place of `g`, zero at pinned nodes, with the derivative of the loss with respect to the forces of colliders.
-    /// `None` if it cannot be.
-    pub fn solve(
-        &self,
-        tangent: &mut Tangent,
-        is_free: &[bool],
-        of_colliders: &[(u64, Vec3)],
-        g: &mut [Vec3],
-    ) -> Option<ContactShare> {
+    /// Adds that a cable, a newton of which acts so, is held at a length; with its stretch per tension [m/N].
+    pub fn add_cable(&mut self, force: NodeVectors, compliance: f64, of_force: f64) {
+        let place = self.rows.len();
+        self.rows.push(Row { acts: force.clone(), looks: force, of_force, of_start: 0.0, of_friction: 0.0 });
+        self.of_forces.resize_mut(place + 1, place + 1, 0.0);
+        self.of_forces[(place, place)] = compliance;
+    }
+
+    /// Solves for z in place of `g`, zero at pinned nodes. `None` if it cannot be.
+    pub fn solve(&self, tangent: &mut Tangent, is_free: &[bool], g: &mut [Vec3]) -> Option<ContactShare> {
         let (count, n) = (self.rows.len(), g.len());
         let mut share = ContactShare { of_end: vec![Vec3::zeros(); n], ..Default::default() };
         share.of_start = share.of_end.clone();
@@ -93,8 +112,8 @@ impl<'a> ContactRows<'a> {
         // H⁻¹ Jᵀ.
         let mut columns = vec![0.0; 3 * n * count];
         for (row, column) in self.rows.iter().zip(columns.chunks_exact_mut(3 * n)) {
-            for (node, weight) in row.contact.weighted_nodes().filter(|(node, _)| is_free[*node]) {
-                (0..3).for_each(|k| column[3 * node + k] += weight * row.acts[k]);
+            for (node, acts) in row.acts.iter().filter(|(node, _)| is_free[*node]) {
+                (0..3).for_each(|k| column[3 * node + k] += acts[k]);
             }
         }
         tangent.solve(&mut columns).then_some(())?;
@@ -104,21 +123,20 @@ impl<'a> ContactRows<'a> {
         for (a, (row, column)) in self.rows.iter().zip(&columns).enumerate() {
             let at = |node: usize| Vec3::new(column[3 * node], column[3 * node + 1], column[3 * node + 2]);
             for (b, other) in self.rows.iter().enumerate() {
-                let ends = other.contact.weighted_nodes().filter(|(node, _)| is_free[*node]);
-                matrix[(a, b)] += ends.map(|(node, weight)| weight * other.looks.dot(&at(node))).sum::<f64>();
+                let ends = other.looks.iter().filter(|(node, _)| is_free[*node]);
+                matrix[(a, b)] += ends.map(|(node, looks)| looks.dot(&at(*node))).sum::<f64>();
             }
-            let own = of_colliders.iter().filter(|(collider, _)| *collider == row.contact.collider);
-            let of_force: f64 = own.map(|(_, derivative)| derivative.dot(&row.acts)).sum();
-            rhs[a] = -of_force - g.iter().enumerate().map(|(node, g)| g.dot(&at(node))).sum::<f64>();
+            rhs[a] = -row.of_force - g.iter().enumerate().map(|(node, g)| g.dot(&at(node))).sum::<f64>();
         }
         let q = solve_dense(matrix, &rhs)?;
         for (row, q) in self.rows.iter().zip(&q) {
             share.of_friction += q * row.of_friction;
-            for (node, weight) in row.contact.weighted_nodes() {
-                share.of_end[node] += row.looks * (weight * q);
-                share.of_start[node] += row.looks * (weight * q * row.of_start);
+            for (node, looks) in &row.looks {
+                share.of_end[*node] += looks * *q;
+                share.of_start[*node] += looks * (q * row.of_start);
             }
         }
+        share.of_cables = q.iter().skip(self.cables_from).copied().collect();
         for ((g, c), _) in g.iter_mut().zip(&share.of_end).zip(is_free).filter(|(_, is_free)| **is_free) {
             *g += c;
         }

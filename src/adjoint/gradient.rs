@@ -1,5 +1,7 @@
 //! Derivatives of a loss, as users read them.
 
+use crate::body::DeformableCableHandle;
+
 /// Derivatives of a loss with respect to the material of a region.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -14,6 +16,19 @@ pub struct MaterialGradient {
     pub mass_damping: f64,
     /// Per pascal of the fibres' modulus.
     pub fibre_modulus: f64,
+}
+
+/// Derivatives of a loss with respect to what drew a cable in one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct CableGradient {
+    /// The cable.
+    pub cable: DeformableCableHandle,
+    /// Per newton of a tension that was given; zero otherwise.
+    pub tension: f64,
+    /// Per metre of the length without tension that was off the winch at the end of the step
+    /// ([`DeformableCable::free_length`](crate::DeformableCable::free_length)), where that was held and the cable taut; zero otherwise.
+    pub length: f64,
 }
 
 /// Derivatives of a loss with respect to what acted on a body in one step.
@@ -32,6 +47,8 @@ pub struct StepGradient {
     pub pressures: Vec<f64>,
     /// Per radian more of roll of each rod that was held against it ([`DeformableBody::hold_twist`](crate::DeformableBody::hold_twist)); zero of others.
     pub rolls: Vec<f64>,
+    /// Of the cables through the body, oldest first.
+    pub cables: Vec<CableGradient>,
     /// Per m/s that each vertex would have gained before the step.
     pub velocities: Vec<[f64; 3]>,
 }
@@ -82,6 +99,16 @@ impl DeformableGradient {
     /// Per radian more of roll of each rod in all steps.
     pub fn rolls(&self) -> Vec<f64> {
         self.columns(|step| &step.rolls)
+    }
+
+    /// Of a tension or a length of a cable that was the same in all steps.
+    pub fn cable(&self, cable: DeformableCableHandle) -> CableGradient {
+        let own = self.steps.iter().flat_map(|step| &step.cables).filter(|of| of.cable == cable);
+        own.fold(CableGradient { cable, tension: 0.0, length: 0.0 }, |sum, of| CableGradient {
+            cable,
+            tension: sum.tension + of.tension,
+            length: sum.length + of.length,
+        })
     }
 
     fn columns(&self, of: impl Fn(&StepGradient) -> &Vec<f64>) -> Vec<f64> {

@@ -1,5 +1,6 @@
 //! What a loss depends on: its derivatives with respect to what was recorded.
 
+use crate::body::DeformableCableHandle;
 use crate::coupling::packed;
 use crate::error::BodyError;
 use crate::fem::DeformableModel;
@@ -23,6 +24,8 @@ pub(super) struct Seed {
     pub velocities: Vec<(usize, Vec3)>,
     /// Of the forces of colliders.
     pub contact_forces: Vec<(u64, Vec3)>,
+    /// Of the tensions of cables.
+    pub tensions: Vec<(DeformableCableHandle, f64)>,
 }
 
 impl DeformableLoss {
@@ -72,6 +75,21 @@ impl DeformableLoss {
         derivative: [f64; 3],
     ) -> Result<(), BodyError> {
         self.seed(step)?.contact_forces.push((packed(collider.into_raw_parts()), derivative.into()));
+        Ok(())
+    }
+
+    /// Adds the derivative with respect to the tension of a cable in a step ([`DeformableCable::tension`](crate::DeformableCable::tension)),
+    /// per newton.
+    ///
+    /// # Errors
+    /// [`BodyError::NoGradient`] if the tape has no such step.
+    pub fn add_tension(
+        &mut self,
+        step: usize,
+        cable: DeformableCableHandle,
+        derivative: f64,
+    ) -> Result<(), BodyError> {
+        self.seed(step)?.tensions.push((cable, derivative));
         Ok(())
     }
 

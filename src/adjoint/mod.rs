@@ -2,6 +2,7 @@
 //! loads, pins, activation and start. Every recorded step is the solution of `F(x′, λ) = 0`, its balance of forces and the laws of
 //! its contacts that bind; going backward takes one solve with the transpose of its derivative a step.
 
+mod cables;
 mod checkpoint;
 mod contact_rows;
 mod directions;
@@ -18,6 +19,6 @@ mod backward;
 
 mod tape;
 
-pub use gradient::{DeformableGradient, MaterialGradient, StepGradient};
+pub use gradient::{CableGradient, DeformableGradient, MaterialGradient, StepGradient};
 pub use loss::DeformableLoss;
 pub use tape::DeformableTape;

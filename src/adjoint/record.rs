@@ -1,5 +1,6 @@
 //! What is kept of a step so that it can be gone through backward, and which steps cannot be.
 
+use super::cables::CableRecord;
 use super::held_twists::TwistRecord;
 use crate::body::{ConstraintKey, DeformableBody, HeldTwist, Integrator, Solver};
 use crate::contact::{Endpoint, Law};
@@ -19,6 +20,9 @@ const SETTLED: f64 = 1.0e-6;
 const SLIDES: f64 = 1.0 - 1.0e-6;
 /// Turn \[rad\] in a step of which the loss is seen, if it is given back.
 const TURNS: f64 = 0.1;
+
+/// Vectors at nodes; one may be there several times.
+pub(super) type NodeVectors = Vec<(usize, Vec3)>;
 
 /// A step of one body.
 #[derive(Clone, Debug)]
@@ -41,6 +45,7 @@ pub(super) struct StepRecord {
     /// On the nodes \[N\]; empty while there are none.
     pub forces: Vec<Vec3>,
     pub contacts: Vec<ContactRecord>,
+    pub cables: Vec<CableRecord>,
     /// What the step has lost of the angular momentum was given back.
     pub keeps_spin: bool,
 }
@@ -63,14 +68,18 @@ pub(super) struct ContactRecord {
 }
 
 impl StepRecord {
-    /// Of the last step of a body, under this gravity [m/s²].
+    /// Of the last step of a body, under this gravity [m/s²], in which these cables ran through it.
     ///
     /// # Errors
     /// Why there is no gradient.
-    pub fn new(body: &DeformableBody, solved: &SolvedBody<'_>, gravity: Vec3) -> Result<Self, &'static str> {
+    pub fn new(
+        body: &DeformableBody,
+        solved: &SolvedBody<'_>,
+        cables: Vec<CableRecord>,
+        gravity: Vec3,
+    ) -> Result<Self, &'static str> {
         check_body(body)?;
         let problem = solved.problem;
-        let carries = |contact: &&SolvedContact<'_>| contact.force != Vec3::zeros();
         let contacts = solved.contacts.iter().filter(carries).map(ContactRecord::new);
         let contacts = contacts.collect::<Result<_, _>>()?;
         check_step(body, solved)?;
@@ -97,9 +106,15 @@ impl StepRecord {
             gravity_scale: body.gravity_scale(),
             forces: body.forces.clone(),
             contacts,
+            cables,
             keeps_spin,
         })
     }
+}
+
+/// Whether a constraint other than one of a cable has a force.
+fn carries(contact: &&SolvedContact<'_>) -> bool {
+    contact.force != Vec3::zeros() && !matches!(contact.constraint.key, ConstraintKey::Cable(_))
 }
 
 fn twist_record(held: &HeldTwist) -> TwistRecord {
@@ -123,7 +138,6 @@ fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
 fn check_step(body: &DeformableBody, solved: &SolvedBody<'_>) -> Result<(), &'static str> {
     let problem = solved.problem;
     let is_solved = problem.residual() <= SOLVED * problem.force_scale() && solved.contact_error <= SOLVED;
-    let carries = |contact: &&SolvedContact<'_>| contact.force != Vec3::zeros();
     let end = |c: &SolvedContact<'_>| c.constraint.frame[0].dot(&c.motion) + c.constraint.target_gap;
     let near = SETTLED * body.model.surface.mean_edge;
     let is_settled = solved.contacts.iter().filter(carries).all(|contact| end(contact).abs() <= near);
@@ -141,7 +155,7 @@ impl ContactRecord {
     fn new(contact: &SolvedContact<'_>) -> Result<Self, &'static str> {
         let constraint = contact.constraint;
         let ConstraintKey::Obstacle(key) = constraint.key else {
-            return Err("contacts with deformable bodies, attachments that yield, and cables have none");
+            return Err("contacts with deformable bodies, and attachments that yield, have none");
         };
         let (Law::Contact { friction }, Endpoint::Soft { nodes, weights, .. }, true) =
             (constraint.law, &constraint.endpoints[0], contact.is_on_prescribed)
@@ -205,6 +219,7 @@ impl StepRecord {
             gravity_scale: 1.0,
             forces: Vec::new(),
             contacts: Vec::new(),
+            cables: Vec::new(),
             keeps_spin: false,
         }
     }

@@ -1,5 +1,5 @@
 //! Solves with the Hessian of a step where it has ended: its Cholesky factor, or, where it is not definite, GMRES with the factor of
-//! what is left without its negative part [Saad & Schultz 1986]; and what filled cavities and held rods resist, one direction each.
+//! what is left without its negative part [Saad & Schultz 1986]; and what filled cavities, held rods and taut cables resist, by single directions.
 
 use super::directions::Directions;
 use super::filled_rooms::{FilledRoom, filled_rooms};
@@ -45,7 +45,9 @@ impl Tangent {
         self.pins.extend_from_slice(pins);
         self.rooms = filled_rooms(model, &record.fillings, x);
         let of_rooms = self.rooms.iter().map(FilledRoom::direction);
-        self.directions.set(of_rooms.chain(twists.iter().map(|twist| twist.direction(model, materials, x))));
+        let of_twists = twists.iter().map(|twist| twist.direction(model, materials, x));
+        let across = record.cables.iter().flat_map(|cable| cable.across(x.len()));
+        self.directions.set(of_rooms.chain(of_twists).chain(across));
         let (symbolic, beside, rooms) = (&self.symbolic, &mut self.beside, &self.rooms);
         let others = |add: &mut dyn FnMut(usize, usize, &Mat3)| {
             rooms.iter().for_each(|room| room.add_pressed(model, x, add));

@@ -1,6 +1,7 @@
 //! Steps as they are recorded, and the way back.
 
 use super::backward::Backward;
+use super::cables::cables_of;
 use super::checkpoint::Checkpoint;
 use super::gradient::{DeformableGradient, MaterialGradient};
 use super::loss::DeformableLoss;
@@ -18,7 +19,7 @@ use std::sync::Arc;
 
 /// Steps of one body, recorded so that derivatives of a loss with respect to what the body is made of, how it began and what acted on it
 /// can be had: exact ones of the converged steps, for one solve a step. What its user changes between steps (forces, pins,
-/// activation, impulses) takes part; what moves or speeds vertices up counts as added to what was there.
+/// activation, impulses, what draws cables) takes part; what moves or speeds vertices up counts as added to what was there.
 ///
 /// Steps have to be solved far: a [`tolerance`](crate::SolverSettings::tolerance) of 1e-10 or less, as that of
 /// [`Fidelity::Reference`](crate::Fidelity::Reference). Contacts are those with colliders that do not yield. What has no gradient is
@@ -123,7 +124,7 @@ impl DeformableTape {
         }
         let gravity = from_real(physics.gravity);
         deformables.step(physics);
-        self.add(deformables, gravity)
+        self.add(physics, deformables, gravity)
     }
 
     /// Records the step that the world has just taken, before anything is changed: where several bodies have a tape each.
@@ -139,16 +140,22 @@ impl DeformableTape {
             let what = "with checkpoints a tape has to take its steps by itself";
             return Err(BodyError::NoGradient { step: self.len(), what }.into());
         }
-        self.add(deformables, from_real(physics.gravity))
+        self.add(physics, deformables, from_real(physics.gravity))
     }
 
-    fn add(&mut self, deformables: &DeformableWorld, gravity: Vec3) -> Result<(), DeformableBodyError> {
+    fn add(
+        &mut self,
+        physics: &PhysicsWorld,
+        deformables: &DeformableWorld,
+        gravity: Vec3,
+    ) -> Result<(), DeformableBodyError> {
         let body = self.body(deformables)?;
         let step = self.len();
         let solved = deformables.pipeline.solved(self.handle).filter(|_| !deformables.counters().skipped);
         let what = "the body was not stepped: it sleeps or is not enabled";
         let solved = solved.ok_or(BodyError::NoGradient { step, what })?;
-        let record = StepRecord::new(body, &solved, gravity);
+        let cables = cables_of(self.handle, (&deformables.bodies, physics), &solved);
+        let record = cables.and_then(|cables| StepRecord::new(body, &solved, cables, gravity));
         self.steps.push(record.map_err(|what| BodyError::NoGradient { step, what })?);
         Ok(())
     }
@@ -261,7 +268,7 @@ impl DeformableTape {
             seed.positions.iter().for_each(|(node, derivative)| back.x[*node] += derivative);
             seed.velocities.iter().for_each(|(node, derivative)| back.v[*node] += derivative);
             let none = |what| BodyError::NoGradient { step, what };
-            back.step(record, &seed.contact_forces, gradient).map_err(none)?;
+            back.step(record, seed, gradient).map_err(none)?;
         }
         Ok(())
     }

@@ -250,6 +250,16 @@ impl DeformableCable {
         self.tensions.last().copied().unwrap_or(0.0)
     }
 
+    /// Tension that it is drawn with, if that is given \[N\].
+    pub(crate) fn given_tension(&self) -> Option<f64> {
+        self.tension
+    }
+
+    /// Whether it ran off a winch that holds it at a length.
+    pub(crate) fn runs_off(&self) -> bool {
+        self.tension() >= self.max_tension * (1.0 - 1.0e-9)
+    }
+
     /// Tensions between the points, from the first on, in the last step \[N\].
     pub fn tensions(&self) -> &[f64] {
         &self.tensions
@@ -280,7 +290,7 @@ impl DeformableCable {
             return Winch::Tension(tension);
         }
         let mut before = self.free_length.unwrap_or(path_length);
-        if self.tension() >= self.max_tension * (1.0 - 1.0e-9) {
+        if self.runs_off() {
             // It has run off the winch.
             before = before.max(path_length - self.compliance * self.tension());
         }

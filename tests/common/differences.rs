@@ -23,6 +23,8 @@ pub struct Run {
     pub filling: Option<CavityFilling>,
     /// Of the last end of the first rod, if that is held \[rad\].
     pub roll: Option<f64>,
+    /// What draws the cable.
+    pub pull: Option<Pull>,
     /// Of the floor; none if there is no friction.
     pub friction: f64,
 }
@@ -40,10 +42,23 @@ impl Run {
             activation: 1.0,
             filling: None,
             roll: None,
+            pull: None,
             friction: 0.0,
         }
     }
 }
+
+/// How a cable is drawn.
+#[derive(Clone, Copy, Debug)]
+pub enum Pull {
+    /// With a tension \[N\].
+    Tension(f64),
+    /// To a length without tension \[m\], with a stretch per tension [m/N].
+    Length(f64, f64),
+}
+
+/// The points of a cable through a body.
+pub type Route = fn(DeformableBodyHandle, &DeformableBody, &mut PhysicsWorld) -> Vec<CablePoint>;
 
 /// What is run.
 #[derive(Clone)]
@@ -54,6 +69,8 @@ pub struct Scene {
     pub floor: Option<f32>,
     pub regions: Vec<(u32, f64)>,
     pub keeps_spin: bool,
+    /// Of a cable, if there is one.
+    pub route: Option<Route>,
     /// The step whose contact force is looked at: what lies on a floor still settles then.
     pub look: usize,
     /// Of all differences.
@@ -72,6 +89,19 @@ pub struct Outcome {
     pub volumes: Vec<f64>,
     pub filling: Option<CavityFilling>,
     pub floor: Option<ColliderHandle>,
+    pub cable: Option<DeformableCableHandle>,
+    /// Of the cable in the step that is looked at \[N\].
+    pub tension: f64,
+}
+
+/// What a run begins with.
+struct Start {
+    physics: PhysicsWorld,
+    world: DeformableWorld,
+    handle: DeformableBodyHandle,
+    tip: usize,
+    floor: Option<ColliderHandle>,
+    cable: Option<DeformableCableHandle>,
 }
 
 /// Numbers without a pattern.
@@ -87,14 +117,23 @@ fn add_floor(physics: &mut PhysicsWorld, height: f32, friction: f64) -> Collider
 
 impl Scene {
     pub fn new(builder: DeformableBodyBuilder) -> Self {
-        Self { builder, steps: 30, floor: None, regions: Vec::new(), keeps_spin: false, look: 7, stride: 1.0 }
+        Self {
+            builder,
+            steps: 30,
+            floor: None,
+            regions: Vec::new(),
+            keeps_spin: false,
+            route: None,
+            look: 7,
+            stride: 1.0,
+        }
     }
 
     pub fn is_sheet(&self) -> bool {
         self.builder.clone().build().unwrap().model().surface_triangles().len() > 0
     }
 
-    pub fn run(&self, run: &Run) -> Outcome {
+    fn start(&self, run: &Run) -> Start {
         let mut physics = PhysicsWorld::new();
         physics.gravity = Vector::Y * run.gravity as f32;
         let floor = self.floor.map(|height| add_floor(&mut physics, height, run.friction));
@@ -105,6 +144,15 @@ impl Scene {
         let handle = world
             .insert(builder.settings(settings.contact_tolerance(1e-12).keeps_spin(self.keeps_spin)))
             .unwrap();
+        let cable = self.route.map(|route| {
+            let points = route(handle, &world.bodies[handle], &mut physics);
+            let cable = DeformableCableBuilder::new(points);
+            let cable = match run.pull.unwrap() {
+                Pull::Tension(tension) => cable.tension(tension),
+                Pull::Length(length, compliance) => cable.length(length).compliance(compliance),
+            };
+            world.bodies.insert_cable(cable).unwrap()
+        });
         let body = &mut world.bodies[handle];
         for (region, modulus) in &self.regions {
             body.set_region_material(*region, run.material.youngs_modulus(*modulus)).unwrap();
@@ -126,11 +174,19 @@ impl Scene {
             body.set_velocity(vertex, Vector::ZERO).unwrap();
             body.set_pin_velocity(vertex, Vector::Z * run.lead as f32).unwrap();
         }
+        Start { physics, world, handle, tip, floor, cable }
+    }
+
+    pub fn run(&self, run: &Run) -> Outcome {
+        let Start { mut physics, mut world, handle, tip, floor, cable } = self.start(run);
         let mut tape = DeformableTape::new(&world, handle).unwrap();
-        let (mut losses, mut volumes) = (Vec::new(), Vec::new());
+        let (mut losses, mut volumes, mut tension) = (Vec::new(), Vec::new(), 0.0);
         for step in 0..self.steps {
             tape.step(&mut physics, &mut world).unwrap();
             volumes.extend(world.bodies[handle].cavity_volume(0));
+            if let Some(cable) = cable.filter(|_| step == self.look) {
+                tension = world.bodies.cable(cable).unwrap().tension();
+            }
             if step + 1 == self.steps || step + 1 == self.steps / 2 {
                 let body = &world.bodies[handle];
                 let at = |v: usize| (body.position(v).unwrap(), body.velocity(v).unwrap());
@@ -152,7 +208,19 @@ impl Scene {
         }
         let contact_force = floor.map_or([0.0; 3], |floor| tape.contact_force(self.look, floor));
         let h = f64::from(physics.integration_parameters.dt);
-        Outcome { loss, tape, seeds, tip, h, contact_force, volumes, filling: run.filling, floor }
+        Outcome {
+            loss,
+            tape,
+            seeds,
+            tip,
+            h,
+            contact_force,
+            volumes,
+            filling: run.filling,
+            floor,
+            cable,
+            tension,
+        }
     }
 }
 
@@ -229,6 +297,26 @@ pub const PINS: Parameter = Parameter {
         };
         g.steps.iter().enumerate().map(led).sum()
     },
+};
+
+pub const TENSION: Parameter = Parameter {
+    name: "tension",
+    by: 0.0078125,
+    change: |run, d| match run.pull.as_mut().unwrap() {
+        Pull::Tension(tension) => *tension += d,
+        Pull::Length(..) => unreachable!(),
+    },
+    of: |g, out| g.cable(out.cable.unwrap()).tension,
+};
+
+pub const LENGTH: Parameter = Parameter {
+    name: "length",
+    by: 0.00006103515625,
+    change: |run, d| match run.pull.as_mut().unwrap() {
+        Pull::Length(length, _) => *length += d,
+        Pull::Tension(_) => unreachable!(),
+    },
+    of: |g, out| g.cable(out.cable.unwrap()).length,
 };
 
 pub const ACTIVATION: Parameter = Parameter {
