@@ -5,14 +5,25 @@
 //! What moves links in a step is handed to rapier as a change of velocities before it, `M⁻¹p`, of which the substeps then take their
 //! part: how far links come by it is the mean of the velocities that are left. With either in full, links would yield by another amount
 //! than contacts were solved with, and a spring would bear a part of a weight only.
+//!
+//! Of motions of which damping takes nearly all in the first substep, as of a root without inertia against its only link, `M⁻¹p` may be 10⁴ rad/s
+//! and more, and in single precision rapier's forces of inertia make of that what they will: they are handed over up to a bound.
 
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 use rapier3d::dynamics::Multibody;
+
+/// Mass of a motion over that with damping in a substep, below which it is bounded; and below which it has no mass, but rounding.
+const DAMPED_AWAY: f64 = 0.5;
+const MASSLESS: f64 = 1.0e-6;
+/// What such a motion is given at the most, of any coordinate in a substep [rad, m].
+const MOST: f64 = 0.1;
 
 /// Of one multibody, in one step.
 pub(super) struct PassiveJoints {
     mass: DMatrix<f64>,
     mass_factors: LU<f64, Dyn, Dyn>,
+    /// Motions of all coordinates, if some are damped away; none of those without mass.
+    motions: Option<Vec<Motion>>,
     substep_factors: LU<f64, Dyn, Dyn>,
     /// By coordinates.
     springs: DVector<Spring>,
@@ -36,23 +47,36 @@ impl PassiveJoints {
         for (i, (damping, spring)) in damping.iter().zip(&springs).enumerate() {
             mass[(i, i)] -= substep * (damping + substep * spring.stiffness);
         }
+        let motions = motions_of(&mass, &augmented);
         let mass_factors = mass.clone().lu();
-        let usable = mass_factors.is_invertible();
+        let usable = motions.is_some() || mass_factors.is_invertible();
         let substeps = substeps.max(1);
         let substep_factors = augmented.lu();
-        usable.then_some(Self { mass, mass_factors, substep_factors, springs, substep, substeps })
+        usable.then_some(Self { mass, mass_factors, motions, substep_factors, springs, substep, substeps })
     }
 
-    /// `M⁻¹ p`.
+    /// `M⁻¹ p`, of what is damped away up to a bound.
     pub fn kick(&self, impulse: &DVector<f64>) -> Option<DVector<f64>> {
-        self.mass_factors.solve(impulse)
+        self.taken_up(impulse, MOST / self.substep)
+    }
+
+    /// `M⁻¹ p`, of what is damped away no more than `most` in any coordinate.
+    fn taken_up(&self, impulse: &DVector<f64>, most: f64) -> Option<DVector<f64>> {
+        let Some(motions) = &self.motions else { return self.mass_factors.solve(impulse) };
+        let mut sum = DVector::zeros(impulse.len());
+        for Motion { shape, mass } in motions {
+            let speed = shape.dot(impulse) / mass;
+            let bound = if *mass < DAMPED_AWAY { most / shape.amax() } else { f64::INFINITY };
+            sum.axpy(speed.clamp(-bound, bound), shape, 1.0);
+        }
+        Some(sum)
     }
 
     /// Means of the velocities that impulses leave over a step, column by column.
     pub fn mean_responses(&self, impulses: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let mut means = DMatrix::zeros(impulses.nrows(), impulses.ncols());
         for (k, impulse) in impulses.column_iter().enumerate() {
-            let kicked = self.kick(&impulse.into_owned())?;
+            let kicked = self.taken_up(&impulse.into_owned(), f64::INFINITY)?;
             means.set_column(k, &self.mean_velocity(kicked, DVector::zeros(impulses.nrows()))?);
         }
         Some(means)
@@ -74,6 +98,36 @@ impl PassiveJoints {
         }
         Some(sum / self.substeps as f64)
     }
+}
+
+/// A motion of all coordinates that is orthogonal to the others.
+struct Motion {
+    shape: DVector<f64>,
+    /// Over that with damping.
+    mass: f64,
+}
+
+/// The motions with mass of a multibody [Golub & Van Loan 2013, 8.7]; `None` where none is damped away.
+fn motions_of(mass: &DMatrix<f64>, augmented: &DMatrix<f64>) -> Option<Vec<Motion>> {
+    let scale = augmented.diagonal().map(|own| own.max(f64::MIN_POSITIVE).sqrt().recip());
+    let scaled = |matrix: &DMatrix<f64>| {
+        let entry = |i: usize, j: usize| 0.5 * (matrix[(i, j)] + matrix[(j, i)]) * scale[i] * scale[j];
+        DMatrix::from_fn(matrix.nrows(), matrix.ncols(), entry)
+    };
+    let own = scaled(mass);
+    // Squares of pivots are never below the least mass of a motion.
+    let factor = own.clone().cholesky();
+    if factor.is_some_and(|factor| factor.l_dirty().diagonal().min().powi(2) > DAMPED_AWAY) {
+        return None;
+    }
+    let whole = scaled(augmented).cholesky()?.l();
+    let half = whole.solve_lower_triangular(&own)?;
+    let both = whole.solve_lower_triangular(&half.transpose())?;
+    let eigen = both.symmetric_eigen();
+    let shapes = whole.transpose().solve_upper_triangular(&eigen.eigenvectors)?;
+    let motions = eigen.eigenvalues.iter().zip(shapes.column_iter());
+    let massive = motions.filter(|(mass, _)| **mass > MASSLESS);
+    Some(massive.map(|(mass, shape)| Motion { shape: shape.component_mul(&scale), mass: *mass }).collect())
 }
 
 /// Of a coordinate.
