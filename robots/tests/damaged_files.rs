@@ -159,3 +159,8 @@ fn files_of_soft_parts() {
         RobotBuilder::urdf("models/arm.urdf").soft_parts_text(text, "models")
     });
 }
+
+#[test]
+fn mjcf_files_that_mujoco_has_saved() {
+    check(5, MUTATIONS / 4, &read("models/saved_flexes.xml"), |text| RobotBuilder::mjcf_text(text, "models"));
+}

@@ -120,7 +120,7 @@ fn what_is_left_out_or_taken_otherwise_is_listed_with_its_line() {
         "kinds.xml:18: flexcomp `square`: edges are not kept at their lengths",
         "kinds.xml:27: edge: damping=\"0.1\" is not taken up",
         "kinds.xml:43: flexcomp `ellipsoid`: dof=\"radial\" is not taken up",
-        "kinds.xml:64: flex `old`: is not taken up",
+        "kinds.xml:64: skin `old`: is not taken up",
         "kinds.xml:66: actuator: `lean` is not taken up",
     ] {
         let there = warnings.iter().filter(|w| w.contains(expected)).count();

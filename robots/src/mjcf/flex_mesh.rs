@@ -236,9 +236,40 @@ fn direct(flexcomp: &Flexcomp) -> Result<FlexMesh, Fault> {
             let triangles: Vec<[u32; 3]> = (0..count / 3).map(|e| [0, 1, 2].map(|c| id(3 * e + c))).collect();
             sheet(flexcomp, points, &triangles)
         }
-        3 => solid(points, (0..count / 4).map(|e| [0, 1, 2, 3].map(|c| id(4 * e + c))).collect()),
-        dim => Err(Fault::Unsupported(format!("dim {dim} of type direct is not offered"))),
+        3 => {
+            let corners = (0..count / 4).map(|e| [0, 1, 2, 3].map(|c| id(4 * e + c)));
+            let turned = corners.map(|corners| outward(&points, corners)).collect();
+            solid(points, turned)
+        }
+        _ => chain(flexcomp, points),
     }
+}
+
+/// MuJoCo numbers the corners of tetrahedra either way around.
+fn outward(points: &[[f64; 3]], corners: [u32; 4]) -> [u32; 4] {
+    let [a, b, c, d] = corners;
+    let at = |corner: u32| points.get(corner as usize);
+    let (Some(a_at), Some(b_at), Some(c_at), Some(d_at)) = (at(a), at(b), at(c), at(d)) else {
+        return corners;
+    };
+    let [u, v, w] = [b_at, c_at, d_at].map(|x| [0, 1, 2].map(|k| x[k] - a_at[k]));
+    let volume = u[0] * (v[1] * w[2] - v[2] * w[1])
+        + u[1] * (v[2] * w[0] - v[0] * w[2])
+        + u[2] * (v[0] * w[1] - v[1] * w[0]);
+    if volume < 0.0 { [a, b, d, c] } else { corners }
+}
+
+/// Edges from each point to the next.
+fn chain(flexcomp: &Flexcomp, points: Vec<[f64; 3]>) -> Result<FlexMesh, Fault> {
+    let follows = |(place, ends): (usize, &[usize])| ends == [place, place + 1];
+    let edges = flexcomp.elements.chunks_exact(2);
+    if edges.len() + 1 != points.len() || !edges.enumerate().all(follows) {
+        let what = "of dim 1 are offered those whose edges lead from each vertex to the next";
+        return Err(Fault::Unsupported(what.to_string()));
+    }
+    let reach = 0.1 * flexcomp.spacing[0];
+    let builder = DeformableBodyBuilder::structure(&Structure::rod(&points, flexcomp.radius)?);
+    Ok(FlexMesh { builder, points, reach })
 }
 
 fn sheet(flexcomp: &Flexcomp, points: Vec<[f64; 3]>, triangles: &[[u32; 3]]) -> Result<FlexMesh, Fault> {

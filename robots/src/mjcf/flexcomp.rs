@@ -220,7 +220,7 @@ fn read_pins(element: &Element<'_, '_>) -> Result<Pins, RobotError> {
     Ok(pins)
 }
 
-fn read_stiffness(
+pub(super) fn read_stiffness(
     element: &Element<'_, '_>,
     dim: usize,
     warnings: &mut Vec<Warning>,
@@ -264,7 +264,10 @@ fn read_stiffness(
     Ok(read)
 }
 
-fn read_contact(element: &Element<'_, '_>, warnings: &mut Vec<Warning>) -> Result<Contact, RobotError> {
+pub(super) fn read_contact(
+    element: &Element<'_, '_>,
+    warnings: &mut Vec<Warning>,
+) -> Result<Contact, RobotError> {
     let mut read = Contact { groups: 1, friction: 1.0, with_itself: None };
     let Some(contact) = element.child("contact") else { return Ok(read) };
     let bits = |key: &str| match contact.attribute(key) {

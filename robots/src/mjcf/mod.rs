@@ -1,5 +1,6 @@
 //! MJCF files: the rigid part by rapier's loader, and what it drops, flexible bodies, out of the same XML.
 
+mod flex;
 mod flex_mesh;
 mod flex_part;
 mod flexcomp;
@@ -44,12 +45,14 @@ pub(crate) fn read(
     pose: Pose,
     solver: JointSolver,
 ) -> Result<(RigidPart, Vec<PlannedPart>), RobotError> {
+    let mut warnings = Vec::new();
+    let taken_out = take_out_flexes(text, file, folder, &options, &mut warnings)?;
+    let (text, flexes) = match &taken_out {
+        Some(taken_out) => (&taken_out.text[..], &taken_out.flexes[..]),
+        None => (text, &[][..]),
+    };
     let document = parse(text, file)?;
     let root = Element::new(document.root_element(), file);
-    if root.tag() != "mujoco" {
-        return Err(root.unsupported("an MJCF file has a <mujoco> at its root"));
-    }
-    tree::check_numbers(&root)?;
     let fail =
         |error: &dyn std::fmt::Display| RobotError::Syntax { place: root.place(), reason: error.to_string() };
     let model = Model::from_str(text, folder).map_err(|error| fail(&error))?;
@@ -65,9 +68,9 @@ pub(crate) fn read(
     let settings = Settings { model: &model, folder };
     let mut found = tree::Found::default();
     tree::walk(&root, &settings, &mut found)?;
-    let mut warnings = std::mem::take(&mut found.warnings);
-    let mut parts = Vec::with_capacity(found.flexcomps.len());
-    for flexcomp in &found.flexcomps {
+    warnings.append(&mut found.warnings);
+    let mut parts = Vec::with_capacity(found.flexcomps.len() + flexes.len());
+    for flexcomp in found.flexcomps.iter().chain(flexes) {
         let link = link_of(&robot, &model, flexcomp)?;
         let carrier = if link == 0 { pose } else { *robot.bodies[link].body.position() };
         parts.push(flex_part::plan(flexcomp, (link > 0).then_some(link), carrier, &settings, &mut warnings)?);
@@ -84,6 +87,23 @@ pub(crate) fn read(
             .push(root.warning("shapes of the world stay where the file has them: the pose moves bodies"));
     }
     Ok((rigid_part(robot, actuators, warnings), parts))
+}
+
+/// Looks at the text, and takes out of it what MuJoCo made of flexible bodies.
+fn take_out_flexes(
+    text: &str,
+    file: &Path,
+    folder: &Path,
+    options: &MjcfLoaderOptions,
+    warnings: &mut Vec<Warning>,
+) -> Result<Option<flex::TakenOut>, RobotError> {
+    let document = parse(text, file)?;
+    let root = Element::new(document.root_element(), file);
+    if root.tag() != "mujoco" {
+        return Err(root.unsupported("an MJCF file has a <mujoco> at its root"));
+    }
+    tree::check_numbers(&root)?;
+    flex::take_out(&root, text, folder, options, warnings)
 }
 
 /// Links and joints in the loader's order.

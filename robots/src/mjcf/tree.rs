@@ -118,9 +118,9 @@ pub(super) fn walk(
         match element.tag() {
             "include" => include(&element, settings, found)?,
             "deformable" => {
-                for flexible in element.children() {
-                    found.warnings.push(flexible.warning("is not taken up: write it as a <flexcomp>"));
-                }
+                // Those of the file itself have been taken out.
+                let others = element.children().filter(|e| found.depth > 0 || e.tag() != "flex");
+                found.warnings.extend(others.map(|e| e.warning("is not taken up")));
             }
             "equality" => {
                 let flexible = |e: &Element<'_, '_>| e.tag().starts_with("flex");
