@@ -79,8 +79,8 @@ fn tensions_and_lengths_have_gradients() {
             let parameters = || MATERIAL.iter().chain(&LOADS).chain([&PINS, of_pull]);
             let error = state_error(&scene, &run, parameters());
             assert!(error < EXACT, "{parameter}, {pull:?}: {error:e}");
-            // What hangs loose has none.
-            if matches!(pull, Pull::Length(..)) && scene.run(&run).tension > 0.0 {
+            if matches!(pull, Pull::Length(..)) {
+                assert!(scene.run(&run).tension > 0.0, "{parameter}, {pull:?} is taut");
                 let look = scene.look;
                 let seeds = |out: &Outcome| {
                     let mut loss = out.tape.loss();
@@ -129,7 +129,7 @@ fn fingers_that_cables_press_on_a_floor_have_gradients() {
                 loss
             };
             let pressed = match pull {
-                Pull::Tension(_) => |out: &Outcome| out.contact_force[1],
+                Pull::Tension(_) | Pull::AsItIs(_) => |out: &Outcome| out.contact_force[1],
                 Pull::Length(..) => |out: &Outcome| out.contact_force[1] + out.tension,
             };
             let error = largest_error(&scene, &run, &pressed, &seeds, parameters());
@@ -152,6 +152,9 @@ fn given_tensions_are_their_own_loss_and_free_bodies_have_gradients() {
     let gradient = out.tape.backward(&loss).unwrap();
     assert_eq!(gradient.cable(out.cable.unwrap()).tension, 2.0);
     assert_eq!(gradient.steps[5].cables[0].tension, 2.0);
+    let mut of_another = out.tape.loss();
+    of_another.add_tension(5, DeformableCableHandle::from_raw_parts(77), 1.0).unwrap();
+    assert!(out.tape.backward(&of_another).is_err());
 }
 
 #[test]
@@ -176,5 +179,20 @@ fn what_has_no_gradient_says_why() {
         ("as far as a step allows", refused(|cable| cable.tension(1.0e6), false)),
     ] {
         assert!(error.contains(why), "{error}");
+    }
+}
+
+/// As long as its way was at the first step: where vertices begin is how long it is.
+#[test]
+fn cables_that_are_as_long_as_they_are_have_gradients() {
+    for (route, parameter) in [(along as Route, "along"), (across, "across")] {
+        let mut scene = Scene::new(bar());
+        // Small, as it goes slack and taut.
+        (scene.route, scene.stride) = (Some(route), 0.03125);
+        let run = Run { pull: Some(Pull::AsItIs(1.0e-3)), push: -0.5, ..Run::of(material()) };
+        println!("{parameter}");
+        assert!(scene.run(&run).taut > 4, "{parameter} is taut");
+        let error = state_error(&scene, &run, MATERIAL.iter().chain(&LOADS).chain([&PINS]));
+        assert!(error < EXACT, "{parameter}: {error:e}");
     }
 }

@@ -300,8 +300,8 @@ impl PyGradient {
         self.by_cable(py, |of| of.tension)
     }
 
-    /// Per metre of the length without tension that was off the winch of each cable at the end of each step (``Cable.free_length``), an array of
-    /// shape (steps, k), where that was held and the cable taut; zero of others.
+    /// Per metre of the length without tension that was asked for of each cable, in steps at whose end the winch had come to it, an array of
+    /// shape (steps, k); zero of others.
     #[getter]
     fn cable_lengths<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
         self.by_cable(py, |of| of.length)

@@ -52,7 +52,8 @@ fn what_is_wrong_is_told_with_its_line() {
     let load = |deformable: &str| {
         let text = format!(
             "<mujoco>\n<worldbody>\n<body name=\"a\" pos=\"1 0 1\"><geom size=\"0.1\"/></body>\n\
-             <body name=\"b\"><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/><joint type=\"slide\"/></body>\n\
+             <body name=\"b\"><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>\
+             <joint type=\"slide\"/><joint type=\"slide\" axis=\"1 0 0\"/><joint type=\"slide\" axis=\"0 1 0\"/></body>\n\
              </worldbody>\n<deformable>\n{deformable}\n</deformable>\n</mujoco>"
         );
         let (mut physics, mut deformables) = (rapier3d::prelude::PhysicsWorld::new(), DeformableWorld::new());
@@ -77,4 +78,14 @@ fn what_is_wrong_is_told_with_its_line() {
         assert!(text.contains(expected) && text.contains(":7"), "{deformable}: {text}");
         assert!(!matches!(error, RobotError::Syntax { .. }), "{text}");
     }
+}
+
+#[test]
+fn what_holds_a_vertex_otherwise_is_told() {
+    let text = std::fs::read_to_string("models/saved_flexes.xml").unwrap();
+    let exclude = "<contact><exclude body1=\"cloth_1\" body2=\"base\"/></contact></mujoco>";
+    let text = text.replace("</mujoco>", exclude);
+    let scene = Scene::new(RobotBuilder::mjcf_text(text, "models"), JointSolver::Multibody);
+    let warnings: Vec<String> = scene.robot.warnings().iter().map(ToString::to_string).collect();
+    assert!(warnings.iter().any(|warning| warning.contains("vertex `cloth_1`")), "{warnings:?}");
 }

@@ -3,7 +3,7 @@
 //! The end solves `F₁ = r(x′) + Jᵀλ = 0` and the laws of the contacts that bind, `F₂ = 0`. With `g = ∂L/∂x′ + ∂L/∂v′/h` and
 //! `H = −∂r/∂x′`, the adjoint z, q of section 14 of docs/method.md gives `dL/dθ = z·∂F₁/∂θ + q·∂F₂/∂θ`.
 
-use super::cables::{CableRecord, OfCable, along};
+use super::cables::{CableRecord, EndOfCable, OfCable, along};
 use super::contact_rows::ContactRows;
 use super::filled_rooms::of_pressures;
 use super::gradient::{CableGradient, DeformableGradient, StepGradient};
@@ -21,16 +21,16 @@ pub(super) struct Backward<'a> {
     model: &'a DeformableModel,
     tangent: Tangent,
     force: Vec<Vec3>,
-    /// With respect to the state between two steps: positions, velocities, and tensions of cables.
+    /// With respect to the state between two steps: positions, velocities, and cables.
     pub x: Vec<Vec3>,
     pub v: Vec<Vec3>,
-    tensions: Vec<(DeformableCableHandle, f64)>,
+    cables: Vec<(DeformableCableHandle, EndOfCable)>,
 }
 
 /// Derivatives of a loss with respect to the forces of a step: of colliders, and of its cables.
 pub(super) struct OfForces<'a> {
     colliders: &'a [(u64, Vec3)],
-    tensions: Vec<f64>,
+    cables: Vec<EndOfCable>,
 }
 
 impl OfForces<'_> {
@@ -52,7 +52,7 @@ impl<'a> Backward<'a> {
     pub fn new(model: &'a DeformableModel) -> Option<Self> {
         let zeros = vec![Vec3::zeros(); model.rest.len()];
         let tangent = Tangent::new(model)?;
-        Some(Self { model, tangent, force: Vec::new(), x: zeros.clone(), v: zeros, tensions: Vec::new() })
+        Some(Self { model, tangent, force: Vec::new(), x: zeros.clone(), v: zeros, cables: Vec::new() })
     }
 
     /// Goes through a step, with what the loss says of the forces in it.
@@ -73,10 +73,10 @@ impl<'a> Backward<'a> {
         }
         let g: Vec<Vec3> = of.x_end.iter().zip(&of.v_end).map(|(x, v)| x + v / h).collect();
         of.x_start.iter_mut().zip(&of.v_end).for_each(|(x, v)| *x -= v / h);
-        let of_forces = self.of_forces(record, seed);
+        let of_forces = self.of_forces(record, seed)?;
         let Solved { z, of_pins, cables } = self.solve(record, &inertia, &of_forces, g, &mut of)?;
-        self.tensions =
-            record.cables.iter().zip(&cables).map(|(cable, of)| (cable.handle, of.lagged)).collect();
+        let between = record.cables.iter().zip(&cables).map(|(cable, of)| (cable.handle, of.before));
+        self.cables = between.collect();
         out.friction += of.friction;
         add_inertia(record, &inertia, &z, &mut of);
         let mut work = ElasticWork { model, record, z: &z, force: &mut self.force };
@@ -126,10 +126,10 @@ impl<'a> Backward<'a> {
         }
         self.tangent.take_off_free(&z_stuck, &is_free, &mut g);
         let mut rows = ContactRows::new(&others, of_forces);
-        for (cable, of_tension) in record.cables.iter().zip(&of_forces.tensions) {
+        for (cable, of_end) in record.cables.iter().zip(&of_forces.cables) {
             if let Some(compliance) = cable.compliance() {
                 let force = cable.force();
-                let of_tension = of_tension + along(&force, &z_stuck);
+                let of_tension = of_end.tension + along(&force, &z_stuck);
                 rows.add_cable(force, compliance, of_tension);
             }
         }
@@ -151,21 +151,29 @@ impl<'a> Backward<'a> {
         of.x_start.iter_mut().zip(&share.of_start).for_each(|(x, c)| *x += c);
         of.friction = share.of_friction;
         let mut lengths = share.of_cables.iter();
-        let cables = record.cables.iter().zip(&of_forces.tensions).map(|(cable, of_tension)| {
+        let cables = record.cables.iter().zip(&of_forces.cables).map(|(cable, of_end)| {
             let q = cable.compliance().and_then(|_| lengths.next().copied()).unwrap_or(0.0);
-            cable.back(&z, q, *of_tension, &mut of.x_start)
+            cable.back(&z, q, *of_end, &mut of.x_start)
         });
         let cables = cables.collect();
         Ok(Solved { z, of_pins, cables })
     }
 
-    /// What the loss says of forces, and later steps of the tensions of cables.
-    fn of_forces<'b>(&self, record: &StepRecord, seed: &'b Seed) -> OfForces<'b> {
-        let of_tension = |cable: &CableRecord| {
-            let both = seed.tensions.iter().chain(&self.tensions);
-            both.filter(|(handle, _)| *handle == cable.handle).map(|(_, of)| of).sum()
+    /// What the loss says of forces, and later steps of cables.
+    fn of_forces<'b>(&self, record: &StepRecord, seed: &'b Seed) -> Result<OfForces<'b>, &'static str> {
+        let is_there = |handle| record.cables.iter().any(|cable| cable.handle == handle);
+        if !seed.tensions.iter().all(|(handle, _)| is_there(*handle)) {
+            return Err("the loss is of a cable that does not run through the body");
+        }
+        let of_end = |cable: &CableRecord| {
+            let is_it = |handle: &DeformableCableHandle| *handle == cable.handle;
+            let later = self.cables.iter().find(|(handle, _)| is_it(handle));
+            let mut of_end = later.map_or(EndOfCable::default(), |(_, of)| *of);
+            let own = seed.tensions.iter().filter(|(handle, _)| is_it(handle));
+            of_end.tension += own.map(|(_, of)| of).sum::<f64>();
+            of_end
         };
-        OfForces { colliders: &seed.contact_forces, tensions: record.cables.iter().map(of_tension).collect() }
+        Ok(OfForces { colliders: &seed.contact_forces, cables: record.cables.iter().map(of_end).collect() })
     }
 }
 

@@ -9,7 +9,7 @@
 use super::record::NodeVectors;
 use crate::body::{
     CablePart, CableRow, ConstraintKey, DeformableBodyHandle, DeformableBodySet, DeformableCable,
-    DeformableCableHandle, Guide,
+    DeformableCableHandle, Guide, LengthFrom,
 };
 use crate::math::{Vec3, tangents};
 use crate::pipeline::{SolvedBody, SolvedContact};
@@ -35,6 +35,7 @@ pub(super) struct CableRecord {
     pub handle: DeformableCableHandle,
     parts: Vec<Part>,
     pull: Pull,
+    length_from: LengthFrom,
     /// λ \[N\].
     tension: f64,
 }
@@ -54,10 +55,18 @@ struct Part {
 /// What a cable says of a loss.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct OfCable {
-    /// Per newton of its tension, per metre of its length without tension, and per newton of its tension in the step before.
+    /// Per newton of its tension, and per metre of its length without tension, where these were given.
     pub tension: f64,
     pub length: f64,
-    pub lagged: f64,
+    /// With respect to the tension and the length of the step before.
+    pub before: EndOfCable,
+}
+
+/// Derivatives of a loss with respect to how a step leaves a cable: per newton of its tension, and per metre of its length without.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct EndOfCable {
+    pub tension: f64,
+    pub length: f64,
 }
 
 /// The cables that ran through a body in its last step.
@@ -105,7 +114,8 @@ impl CableRecord {
                 lagged: lagged_tension(handle, place as u32, v.norm(), &solved.contacts),
             }
         });
-        Ok(Self { handle, parts: parts.collect(), pull, tension: cable.tension() })
+        let length_from = cable.length_from();
+        Ok(Self { handle, parts: parts.collect(), pull, length_from, tension: cable.tension() })
     }
 
     /// The force of a newton of tension on the nodes.
@@ -137,18 +147,24 @@ impl CableRecord {
         })
     }
 
-    /// What z and q say, with what the loss and later steps say of the tension; adds what is of the start.
-    pub fn back(&self, z: &[Vec3], q: f64, of_tension: f64, of_start: &mut [Vec3]) -> OfCable {
+    /// What z and q say, with what the loss and later steps say of its end; adds what is of the start.
+    pub fn back(&self, z: &[Vec3], q: f64, of_end: EndOfCable, of_start: &mut [Vec3]) -> OfCable {
         let mut of = OfCable::default();
+        let of_length = q + of_end.length;
+        let of_way = if self.length_from == LengthFrom::Way { of_length } else { 0.0 };
         for part in &self.parts {
             let (of_v, of_lagged) = part.back(z, q, self.tension);
+            let of_v = of_v + part.direction() * of_way;
             part.nodes.iter().for_each(|(node, weight)| of_start[*node] += of_v * *weight);
-            of.lagged += of_lagged;
+            of.before.tension += of_lagged;
         }
-        match self.pull {
-            Pull::Slack => {}
-            Pull::Tension => of.tension = of_tension + along(&self.force(), z),
-            Pull::Length { .. } => of.length = q,
+        match self.length_from {
+            LengthFrom::Target => of.length = of_length,
+            LengthFrom::Before => of.before.length = of_length,
+            LengthFrom::Way => {}
+        }
+        if self.pull == Pull::Tension {
+            of.tension = of_end.tension + along(&self.force(), z);
         }
         of
     }

@@ -26,8 +26,9 @@ pub struct CableGradient {
     pub cable: DeformableCableHandle,
     /// Per newton of a tension that was given; zero otherwise.
     pub tension: f64,
-    /// Per metre of the length without tension that was off the winch at the end of the step
-    /// ([`DeformableCable::free_length`](crate::DeformableCable::free_length)), where that was held and the cable taut; zero otherwise.
+    /// Per metre of the length without tension that was asked for, in steps at whose end the winch had come to it
+    /// ([`DeformableCable::free_length`](crate::DeformableCable::free_length)); zero otherwise. Of a cable that is as long as its way was at
+    /// first that is part of the derivative with respect to positions.
     pub length: f64,
 }
 

@@ -79,7 +79,7 @@ impl DeformableLoss {
     }
 
     /// Adds the derivative with respect to the tension of a cable in a step ([`DeformableCable::tension`](crate::DeformableCable::tension)),
-    /// per newton.
+    /// per newton. Going backward refuses one that does not run through the body in that step.
     ///
     /// # Errors
     /// [`BodyError::NoGradient`] if the tape has no such step.

@@ -133,6 +133,21 @@ pub struct DeformableCable {
     pub(crate) points: Vec<Vec3>,
     changed: bool,
     rigid_poses: Vec<Option<Pose64>>,
+    /// Where the length of the last step is from.
+    #[cfg_attr(feature = "serde-serialize", serde(skip))]
+    length_from: LengthFrom,
+}
+
+/// What the length of a cable without tension at the end of a step follows from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum LengthFrom {
+    /// It is the one that was asked for.
+    #[default]
+    Target,
+    /// From that before the step.
+    Before,
+    /// From the way through its points at the start of the step.
+    Way,
 }
 
 /// A point of a cable, on what carries it.
@@ -169,6 +184,7 @@ impl DeformableCable {
             points: Vec::new(),
             changed: true,
             rigid_poses: vec![None; route.len()],
+            length_from: LengthFrom::default(),
             route,
         }
     }
@@ -255,6 +271,10 @@ impl DeformableCable {
         self.tension
     }
 
+    pub(crate) fn length_from(&self) -> LengthFrom {
+        self.length_from
+    }
+
     /// Whether it ran off a winch that holds it at a length.
     pub(crate) fn runs_off(&self) -> bool {
         self.tension() >= self.max_tension * (1.0 - 1.0e-9)
@@ -287,12 +307,15 @@ impl DeformableCable {
     pub(crate) fn wind(&mut self, path_length: f64, h: f64) -> Winch {
         if let Some(tension) = self.tension {
             self.free_length = Some(path_length);
+            self.length_from = LengthFrom::Way;
             return Winch::Tension(tension);
         }
         let mut before = self.free_length.unwrap_or(path_length);
+        let mut from = if self.free_length.is_some() { LengthFrom::Before } else { LengthFrom::Way };
         if self.runs_off() {
             // It has run off the winch.
             before = before.max(path_length - self.compliance * self.tension());
+            from = LengthFrom::Way;
         }
         let target = self.target.unwrap_or(before);
         let most = self.speed * h;
@@ -301,6 +324,7 @@ impl DeformableCable {
         } else {
             before + (target - before).clamp(-most, most)
         };
+        self.length_from = if self.target == Some(after) { LengthFrom::Target } else { from };
         self.changed |= after != before;
         self.free_length = Some(after);
         Winch::Length { before, after, most: self.max_tension }

@@ -49,7 +49,7 @@ pub use body::DeformableBody;
 pub(crate) use body::{check_pose, in_range};
 pub use builder::DeformableBodyBuilder;
 pub use cable::{CablePoint, DeformableCable, DeformableCableBuilder};
-pub(crate) use cable::{Guide, Winch};
+pub(crate) use cable::{Guide, LengthFrom, Winch};
 pub use constraint_memory::JointRole;
 pub(crate) use constraint_memory::{
     AttachmentAxis, AttachmentDirection, CablePart, CableRow, ConstraintGeometry, ConstraintKey,

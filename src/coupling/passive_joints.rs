@@ -115,12 +115,12 @@ fn motions_of(mass: &DMatrix<f64>, augmented: &DMatrix<f64>) -> Option<Vec<Motio
         DMatrix::from_fn(matrix.nrows(), matrix.ncols(), entry)
     };
     let own = scaled(mass);
-    // Squares of pivots are never below the least mass of a motion.
-    let factor = own.clone().cholesky();
-    if factor.is_some_and(|factor| factor.l_dirty().diagonal().min().powi(2) > DAMPED_AWAY) {
+    let with_damping = scaled(augmented);
+    // Positive definite where no motion has so little.
+    if (&own - &with_damping * DAMPED_AWAY).cholesky().is_some() {
         return None;
     }
-    let whole = scaled(augmented).cholesky()?.l();
+    let whole = with_damping.cholesky()?.l();
     let half = whole.solve_lower_triangular(&own)?;
     let both = whole.solve_lower_triangular(&half.transpose())?;
     let eigen = both.symmetric_eigen();

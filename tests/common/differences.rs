@@ -55,6 +55,8 @@ pub enum Pull {
     Tension(f64),
     /// To a length without tension \[m\], with a stretch per tension [m/N].
     Length(f64, f64),
+    /// As long as it is, with a stretch per tension.
+    AsItIs(f64),
 }
 
 /// The points of a cable through a body.
@@ -92,6 +94,8 @@ pub struct Outcome {
     pub cable: Option<DeformableCableHandle>,
     /// Of the cable in the step that is looked at \[N\].
     pub tension: f64,
+    /// Steps in which it was taut.
+    pub taut: usize,
 }
 
 /// What a run begins with.
@@ -150,6 +154,7 @@ impl Scene {
             let cable = match run.pull.unwrap() {
                 Pull::Tension(tension) => cable.tension(tension),
                 Pull::Length(length, compliance) => cable.length(length).compliance(compliance),
+                Pull::AsItIs(compliance) => cable.compliance(compliance),
             };
             world.bodies.insert_cable(cable).unwrap()
         });
@@ -180,12 +185,14 @@ impl Scene {
     pub fn run(&self, run: &Run) -> Outcome {
         let Start { mut physics, mut world, handle, tip, floor, cable } = self.start(run);
         let mut tape = DeformableTape::new(&world, handle).unwrap();
-        let (mut losses, mut volumes, mut tension) = (Vec::new(), Vec::new(), 0.0);
+        let (mut losses, mut volumes, mut tension, mut taut) = (Vec::new(), Vec::new(), 0.0, 0);
         for step in 0..self.steps {
             tape.step(&mut physics, &mut world).unwrap();
             volumes.extend(world.bodies[handle].cavity_volume(0));
-            if let Some(cable) = cable.filter(|_| step == self.look) {
-                tension = world.bodies.cable(cable).unwrap().tension();
+            let drawn = cable.map_or(0.0, |cable| world.bodies.cable(cable).unwrap().tension());
+            taut += usize::from(drawn > 0.0);
+            if step == self.look {
+                tension = drawn;
             }
             if step + 1 == self.steps || step + 1 == self.steps / 2 {
                 let body = &world.bodies[handle];
@@ -220,6 +227,7 @@ impl Scene {
             floor,
             cable,
             tension,
+            taut,
         }
     }
 }
@@ -304,7 +312,7 @@ pub const TENSION: Parameter = Parameter {
     by: 0.0078125,
     change: |run, d| match run.pull.as_mut().unwrap() {
         Pull::Tension(tension) => *tension += d,
-        Pull::Length(..) => unreachable!(),
+        Pull::Length(..) | Pull::AsItIs(_) => unreachable!(),
     },
     of: |g, out| g.cable(out.cable.unwrap()).tension,
 };
@@ -314,7 +322,7 @@ pub const LENGTH: Parameter = Parameter {
     by: 0.00006103515625,
     change: |run, d| match run.pull.as_mut().unwrap() {
         Pull::Length(length, _) => *length += d,
-        Pull::Tension(_) => unreachable!(),
+        Pull::Tension(_) | Pull::AsItIs(_) => unreachable!(),
     },
     of: |g, out| g.cable(out.cable.unwrap()).length,
 };

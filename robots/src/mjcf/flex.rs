@@ -8,7 +8,7 @@ use crate::xml::Element;
 use rapier3d::math::{Pose, Vector};
 use rapier3d_mjcf::mjcf_rs::model::Model;
 use rapier3d_mjcf::{MjcfLoaderOptions, MjcfRobot};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// A text without the bodies of vertices, and what these make up.
@@ -39,19 +39,57 @@ pub(super) fn take_out(
     if elements.is_empty() {
         return Ok(None);
     }
-    let bodies = bodies(root, text, folder, options)?;
+    let mut bodies = bodies(root, text, folder, options)?;
+    keep_carriers(&mut bodies, &elements);
     let flexes = elements.iter().map(|element| read(element, &bodies, warnings));
     let flexes = flexes.collect::<Result<_, _>>()?;
     let mut bytes = text.as_bytes().to_vec();
-    for element in &elements {
-        for name in names(element) {
-            if let Some(range) = bodies.get(name).and_then(|body| body.vertex.clone()) {
-                // Lines keep their numbers.
-                bytes[range].iter_mut().filter(|byte| **byte != b'\n').for_each(|byte| *byte = b' ');
-            }
+    let named: BTreeSet<&str> = elements.iter().flat_map(names).collect();
+    for name in named {
+        if let Some(range) = bodies.get(name).and_then(|body| body.vertex.clone()) {
+            warn_of_uses(root, name, &range, warnings);
+            // Lines keep their numbers.
+            bytes[range].iter_mut().filter(|byte| **byte != b'\n').for_each(|byte| *byte = b' ');
         }
     }
     Ok(Some(TakenOut { text: String::from_utf8_lossy(&bytes).into_owned(), flexes }))
+}
+
+/// A body that several vertices are on is one that carries them.
+fn keep_carriers(bodies: &mut BTreeMap<&str, Body>, elements: &[Element<'_, '_>]) {
+    let mut seen = BTreeSet::new();
+    for element in elements {
+        let is_alone = names(element).nth(1).is_none();
+        for name in names(element) {
+            if (is_alone || !seen.insert(name))
+                && let Some(body) = bodies.get_mut(name)
+            {
+                body.vertex = None;
+            }
+        }
+    }
+}
+
+/// What else names a body that is taken out, or its joints.
+fn warn_of_uses(
+    root: &Element<'_, '_>,
+    name: &str,
+    range: &std::ops::Range<usize>,
+    warnings: &mut Vec<Warning>,
+) {
+    let own = root.node.descendants().filter(|node| node.is_element() && range.contains(&node.range().start));
+    let lost: Vec<&str> = own.filter_map(|node| node.attribute("name")).collect();
+    let others = root.node.descendants().filter(|node| {
+        node.is_element() && !node.has_tag_name("flex") && !range.contains(&node.range().start)
+    });
+    for node in others {
+        let refers = |key: &&str| node.attribute(*key).is_some_and(|other| lost.contains(&other));
+        let keys = ["body", "body1", "body2", "joint", "joint1", "joint2", "objname", "target"];
+        if keys.iter().any(|key| refers(key)) {
+            let what = format!("names what is the vertex `{name}` of a flex here, and no body");
+            warnings.push(Element::new(node, root.file).warning(what));
+        }
+    }
 }
 
 fn names<'a>(element: &Element<'a, '_>) -> impl Iterator<Item = &'a str> {
@@ -79,7 +117,7 @@ fn bodies<'a>(
         let is_bare = element.children().all(|child| ["joint", "inertial"].contains(&child.tag()));
         let joints: Vec<_> = element.children().filter(|child| child.tag() == "joint").collect();
         let is_led = joints.iter().all(|joint| joint.attribute("type") == Some("slide"));
-        let is_vertex = is_bare && is_led && !joints.is_empty();
+        let is_vertex = is_bare && is_led && joints.len() == 3;
         let vertex = is_vertex.then(|| node.range());
         bodies.insert(name, Body { pose: *found.body.position(), mass: f64::from(found.mass), vertex });
     }
@@ -183,7 +221,8 @@ impl Vertices {
         let free = names.len() - pins.len();
         let mass: f64 = found.iter().filter(|body| body.vertex.is_some()).map(|body| body.mass).sum();
         if !(mass > 0.0) {
-            return Err(element.unsupported("none of its vertices has a body with slides and a mass"));
+            return Err(element
+                .unsupported("none of its vertices has a body of its own with three slides and a mass"));
         }
         let frame = bodies[carrier].pose;
         let at = |(body, local): (&&Body, &[f64])| {

@@ -83,6 +83,8 @@ impl BodyProblem {
         };
         self.dt = h;
         self.is_touched = false;
+        self.is_attached = false;
+        self.held_nodes.clear();
         self.read_body(body, gravity);
     }
 
@@ -125,8 +127,6 @@ impl BodyProblem {
         self.guard_retries = 0;
         self.is_rejected = false;
         self.was_redone = false;
-        self.is_attached = false;
-        self.held_nodes.clear();
         self.begin_limits();
         self.kinetic_bound = f64::INFINITY;
         self.preconditioner.counters = SolveCounters::default();
