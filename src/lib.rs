@@ -133,11 +133,11 @@ pub use touch::{ContactWrench, DepthCamera, TactilePad, TactileReading};
 /// Everything a scene needs; safe to import beside `rapier3d::prelude::*`.
 pub mod prelude {
     pub use crate::{
-        Acceleration, Actuator, ActuatorError, ActuatorSignal, AttachTo, CablePoint, CavityFilling,
-        ContactWrench, DeformableActuators, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
-        DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet, DeformableCable,
-        DeformableCableBuilder, DeformableCableHandle, DeformableChannelEventCollector, DeformableColliders,
-        DeformableCollisionEvent, DeformableContact, DeformableContactForceEvent,
+        Acceleration, Actuator, ActuatorError, ActuatorSignal, AttachTo, CableGradient, CablePoint,
+        CavityFilling, ContactWrench, DeformableActuators, DeformableAttachment, DeformableAttachmentHandle,
+        DeformableBody, DeformableBodyBuilder, DeformableBodyError, DeformableBodyHandle, DeformableBodySet,
+        DeformableCable, DeformableCableBuilder, DeformableCableHandle, DeformableChannelEventCollector,
+        DeformableColliders, DeformableCollisionEvent, DeformableContact, DeformableContactForceEvent,
         DeformableContactModificationContext, DeformableContactPartner, DeformableCounters, DeformableDrag,
         DeformableEventHandler, DeformableGradient, DeformableHooks, DeformableLoss, DeformableMaterial,
         DeformableMode, DeformableModel, DeformablePairContact, DeformablePairFilterContext,

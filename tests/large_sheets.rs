@@ -130,3 +130,42 @@ fn curtains_that_swing_against_walls_make_no_energy() {
         assert!(touched > 10 && highest - start < 1e-3 * scale, "{e:e} Pa: {start} J to {highest} J");
     }
 }
+
+/// How high the lowest vertex of what is draped is when it falls asleep \[m\], and when that is \[s\].
+fn draped(cloth: DeformableBodyBuilder, obstacle: ColliderBuilder) -> Option<(f64, f64)> {
+    let mut physics = PhysicsWorld::new();
+    physics.insert_collider(obstacle.friction(0.5), None);
+    let mut world = DeformableWorld::new();
+    let body = world.insert(cloth).unwrap();
+    (0..600).find_map(|step| {
+        world.step(&mut physics);
+        let lowest = positions(&world.bodies[body]).iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+        world.bodies[body].is_sleeping().then_some((lowest, f64::from(step) / 60.0))
+    })
+}
+
+/// Once they fell asleep after a second with what hangs over the edge in the air, at -0.301 m and -0.314 m.
+#[test]
+fn tablecloths_do_not_fall_asleep_in_the_air() {
+    let cloth = |cells: usize, e: f64| {
+        DeformableBodyBuilder::cloth([0.5, 0.5], [cells; 2], 5e-4)
+            .material(DeformableMaterial::new(e, 0.3).density(400.0).mass_damping(1.0))
+    };
+    let table = || ColliderBuilder::cuboid(0.3, 0.1, 0.3).translation(Vector::new(0.0, -0.4, 0.0));
+    let floor = || ColliderBuilder::cuboid(2.0, 0.1, 2.0).translation(Vector::new(0.0, -1.05, 0.0));
+    let newton = SolverSettings::default().solver(Solver::Newton).tolerance(1e-3).max_iterations(3);
+    for (cells, e) in [(20, 1e6), (20, 1e8), (32, 1e7)] {
+        let found = draped(cloth(cells, e), table()).expect("it sleeps within ten seconds");
+        let other = draped(cloth(cells, e).settings(newton), table()).expect("it sleeps by Newton's method");
+        println!("{cells} cells, {e:.0e} Pa: asleep at {found:?}, by Newton's method at {other:?}");
+        assert!((found.0 - other.0).abs() < 0.02, "{found:?} {other:?}");
+    }
+    // A curtain whose hem comes to the floor, let go from the horizontal.
+    let curtain = |solver: Option<SolverSettings>| {
+        let curtain = cloth(20, 1e7).pinned(|x| x.x < -0.499);
+        draped(solver.map_or(curtain.clone(), |solver| curtain.settings(solver)), floor())
+    };
+    let (found, other) = (curtain(None).unwrap(), curtain(Some(newton)).unwrap());
+    println!("curtain: asleep at {found:?}, by Newton's method at {other:?}");
+    assert!((found.0 - other.0).abs() < 1e-3 && found.1 > 2.0, "{found:?} {other:?}");
+}

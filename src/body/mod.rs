@@ -63,6 +63,7 @@ pub use handle::{
 };
 pub(crate) use impact::{Impact, Partner};
 pub use set::DeformableBodySet;
+pub(crate) use settings::StepState;
 pub use settings::{Acceleration, FactorPrecision, Fidelity, Frames, Integrator, Solver, SolverSettings};
 pub use state::DeformableState;
 pub(crate) use state::{History, Sleep, Surroundings, is_number};

@@ -30,6 +30,7 @@ pub enum Solver {
     /// reference, and right for ropes and stiff cloth.
     Newton,
     /// [`Solver::Newton`] while the body hangs by pins and hard attachments, an iteration in the place of ten of `max_iterations`;
+    /// three in contact where it is slow and its last step was far from solved, which is how what hangs over an edge comes down;
     /// else [`Solver::Projective`]: where anything comes near enough to touch it within the step, a cable runs through it or it is attached to what
     /// yields, so few end unsolved. The default of sheets of more than 256 vertices: what hangs comes
     /// to rest where it should, at 1.5 times the price of the constant matrix with 441 vertices, 3 times with 1681, 5 times with 10 000.
@@ -285,16 +286,30 @@ impl Default for SolverSettings {
 
 /// Iterations of the constant matrix in the place of which [`Solver::Automatic`] takes one of Newton's method.
 const ITERATIONS_OF_NEWTON: usize = 10;
+/// As many times more where the body is touched.
+const SETTLING_ITERATIONS: usize = 3;
+
+/// What [`Solver::Automatic`] goes by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum StepState {
+    /// Pinned, and not touched.
+    Hangs,
+    /// Touched, slow, and the last step was far from solved.
+    Settles,
+    Other,
+}
 
 impl SolverSettings {
-    /// With what a step of a body is solved that hangs and is not touched, or any other.
-    pub(crate) fn of_step(self, hangs: bool) -> Self {
-        match self.solver {
-            Solver::Automatic if hangs => {
-                let iterations = self.max_iterations.div_ceil(ITERATIONS_OF_NEWTON);
-                self.solver(Solver::Newton).max_iterations(iterations)
-            }
-            Solver::Automatic => self.solver(Solver::Projective),
+    /// With what a step of a body is solved that is in this state.
+    pub(crate) fn of_step(self, state: StepState) -> Self {
+        let newton = |count: usize| {
+            let iterations = (count * self.max_iterations).div_ceil(ITERATIONS_OF_NEWTON);
+            self.solver(Solver::Newton).max_iterations(iterations)
+        };
+        match (self.solver, state) {
+            (Solver::Automatic, StepState::Hangs) => newton(1),
+            (Solver::Automatic, StepState::Settles) => newton(SETTLING_ITERATIONS),
+            (Solver::Automatic, StepState::Other) => self.solver(Solver::Projective),
             _ => self,
         }
     }

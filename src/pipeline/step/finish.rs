@@ -10,7 +10,7 @@ use super::sleeping::LookAround;
 use super::work::IslandWork;
 use crate::body::{
     DeformableAttachment, DeformableBody, DeformableBodyHandle, DeformableBodySet, DeformableContact,
-    DeformablePairContact, DeformableState, Integrator, is_number,
+    DeformablePairContact, DeformableState, Integrator, Solver, is_number,
 };
 use crate::coupling::StepContext;
 use crate::pipeline::DeformableCounters;
@@ -126,6 +126,8 @@ pub(super) fn store(
     body.report.iterations = work.island.report.iterations;
     body.report.residual = problem.residual();
     body.report.tolerance = problem.settings.tolerance.max(ROUNDING) * problem.force_scale();
+    let is_automatic = body.settings().solver == Solver::Automatic;
+    body.state.is_unsolved = is_automatic && !problem.is_rejected && problem.is_far_from_solved();
     body.report.guard_retries = problem.guard_retries;
     counters.guard_retries += problem.guard_retries;
     counters.not_converged += usize::from(!body.last_converged());

@@ -2,11 +2,14 @@
 
 use super::generalized_alpha::{SCALE, alpha_step};
 use super::problem::{BodyProblem, Iterate, SECOND_ORDER, Scheme};
-use crate::body::{DeformableBody, Integrator, PrescribedNode, SolverSettings};
+use crate::body::{DeformableBody, Integrator, PrescribedNode, SolverSettings, StepState};
 use crate::fem::StiffnessDamping;
 use crate::math::{Mat3, Vec3};
 use crate::solver::counters::SolveCounters;
 use crate::solver::linear::{FactorId, FactorKey, Preconditioner};
+
+/// Largest speed [m/s] at which a touched body is solved by Newton's method, if it has an automatic solver.
+const SETTLING: f64 = 0.2;
 
 impl BodyProblem {
     /// Of a body at the start of a step of `h` \[s\] under `gravity` [m/s²], with the nodes that attachments prescribe.
@@ -102,9 +105,18 @@ impl BodyProblem {
         }
     }
 
+    /// What is left would move a node as half of its weight does.
+    pub fn is_far_from_solved(&self) -> bool {
+        !self.has_converged() && self.residual() > 0.5 * self.weight
+    }
+
     fn settings_of(&self, body: &DeformableBody) -> SolverSettings {
         let is_pinned = !(body.pins.is_empty() && self.prescribed.is_empty());
-        body.settings().of_step(is_pinned && !self.is_touched)
+        body.settings().of_step(match self.is_touched {
+            true if body.state.is_unsolved && body.max_speed() < SETTLING => StepState::Settles,
+            false if is_pinned => StepState::Hangs,
+            _ => StepState::Other,
+        })
     }
 
     fn read_body(&mut self, body: &DeformableBody, gravity: &Vec3) {

@@ -8,7 +8,7 @@
 
 use super::coefficients::{dimension, node_inertia};
 use super::factor::Symbolic;
-use crate::body::{DeformableBody, FactorPrecision, Solver};
+use crate::body::{DeformableBody, FactorPrecision, Solver, StepState};
 use crate::energy::Elasticity;
 use crate::fem::constant_matrix::add_blocks;
 use crate::fem::{DeformableModel, Elements, SystemMatrix, add_tangents};
@@ -71,15 +71,15 @@ impl FactorKey {
             pins: Vec::new(),
             base: Vec::new(),
         };
-        key.update(body, body.settings().of_step(false).solver, h, std::iter::empty());
+        key.update(body, body.settings().of_step(StepState::Other).solver, h, std::iter::empty());
         key
     }
 
     /// As [`FactorKey::new`], of a body that nothing touches, and that hangs if it is pinned.
     pub fn untouched(body: &DeformableBody, h: f64) -> Self {
         let mut key = Self::new(body, h);
-        let hangs = !key.pins.is_empty();
-        key.update(body, body.settings().of_step(hangs).solver, h, std::iter::empty());
+        let state = if key.pins.is_empty() { StepState::Other } else { StepState::Hangs };
+        key.update(body, body.settings().of_step(state).solver, h, std::iter::empty());
         key
     }
 
