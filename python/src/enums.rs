@@ -153,7 +153,7 @@ choices! {
         Jacobi = "JACOBI",
         /// Newton's method, the default of ropes and small sheets.
         Newton = "NEWTON",
-        /// Newton's method for what hangs untouched, else Projective Dynamics: the default of large sheets.
+        /// Newton's method for what hangs untouched or settles, else Projective Dynamics: the default of large sheets.
         Automatic = "AUTOMATIC",
     }
 }

@@ -242,8 +242,8 @@ pub struct SolverSettings {
     /// Slices of a solid along its length, up to 32, that the [`SystemMatrix::Laplacian`] lets turn: it resists
     /// rotation, of the body and within it, and these take that out. Zero, the default, leaves it.
     pub clusters: usize,
-    /// Global iterations at the most, at least one; of [`Solver::Automatic`] a tenth where it takes Newton's method, rounded up. Bodies that touch one rigid body are solved together:
-    /// the largest limit among them counts.
+    /// Global iterations at the most, at least one; of [`Solver::Automatic`] a tenth where it takes Newton's method, three in contact,
+    /// rounded up. Bodies that touch one rigid body are solved together: the largest limit among them counts.
     pub max_iterations: usize,
     /// Iterate until the largest residual force is below this fraction of the largest force on a
     /// node (weight, internal or contact force, whichever is largest).

@@ -275,7 +275,7 @@ pub enum SolverKind {
     Jacobi,
     /// Newton's method.
     Newton,
-    /// Newton's method for what hangs untouched, else Projective Dynamics.
+    /// Newton's method for what hangs untouched or settles, else Projective Dynamics.
     Automatic,
 }
 

@@ -45,13 +45,12 @@ pub(super) fn take_out(
     let flexes = flexes.collect::<Result<_, _>>()?;
     let mut bytes = text.as_bytes().to_vec();
     let named: BTreeSet<&str> = elements.iter().flat_map(names).collect();
-    for name in named {
-        if let Some(range) = bodies.get(name).and_then(|body| body.vertex.clone()) {
-            warn_of_uses(root, name, &range, warnings);
-            // Lines keep their numbers.
-            bytes[range].iter_mut().filter(|byte| **byte != b'\n').for_each(|byte| *byte = b' ');
-        }
+    let vertex = |name: &&str| bodies.get(name).and_then(|body| body.vertex.clone());
+    for range in named.iter().filter_map(vertex) {
+        // Lines keep their numbers.
+        bytes[range].iter_mut().filter(|byte| **byte != b'\n').for_each(|byte| *byte = b' ');
     }
+    warn_of_uses(root, |name| named.get(name).and_then(vertex).is_some(), warnings);
     Ok(Some(TakenOut { text: String::from_utf8_lossy(&bytes).into_owned(), flexes }))
 }
 
@@ -71,21 +70,21 @@ fn keep_carriers(bodies: &mut BTreeMap<&str, Body>, elements: &[Element<'_, '_>]
 }
 
 /// What else names a body that is taken out, or its joints.
-fn warn_of_uses(
-    root: &Element<'_, '_>,
-    name: &str,
-    range: &std::ops::Range<usize>,
-    warnings: &mut Vec<Warning>,
-) {
-    let own = root.node.descendants().filter(|node| node.is_element() && range.contains(&node.range().start));
-    let lost: Vec<&str> = own.filter_map(|node| node.attribute("name")).collect();
-    let others = root.node.descendants().filter(|node| {
-        node.is_element() && !node.has_tag_name("flex") && !range.contains(&node.range().start)
-    });
+fn warn_of_uses(root: &Element<'_, '_>, is_out: impl Fn(&str) -> bool, warnings: &mut Vec<Warning>) {
+    let names = |node: &roxmltree::Node<'_, '_>| {
+        node.has_tag_name("body") && node.attribute("name").is_some_and(&is_out)
+    };
+    // Which vertex each lost name belongs to.
+    let mut lost = BTreeMap::new();
+    for body in root.node.descendants().filter(names) {
+        let own = body.descendants().filter_map(|node| node.attribute("name"));
+        lost.extend(own.map(|name| (name, body.attribute("name").unwrap_or_default())));
+    }
+    let keys = ["body", "body1", "body2", "joint", "joint1", "joint2", "objname", "target"];
+    let others = root.node.descendants().filter(|node| node.is_element() && !node.has_tag_name("flex"));
     for node in others {
-        let refers = |key: &&str| node.attribute(*key).is_some_and(|other| lost.contains(&other));
-        let keys = ["body", "body1", "body2", "joint", "joint1", "joint2", "objname", "target"];
-        if keys.iter().any(|key| refers(key)) {
+        let refers = |key: &&str| node.attribute(*key).and_then(|other| lost.get(other));
+        if let Some(name) = keys.iter().find_map(refers) {
             let what = format!("names what is the vertex `{name}` of a flex here, and no body");
             warnings.push(Element::new(node, root.file).warning(what));
         }
@@ -106,14 +105,15 @@ fn bodies<'a>(
     let fail = |error: String| RobotError::Syntax { place: root.place(), reason: error };
     let model = Model::from_str(text, folder).map_err(|error| fail(error.to_string()))?;
     let robot = MjcfRobot::from_model(&model, options.clone(), folder);
+    let loaded: BTreeMap<&str, _> = (robot.bodies.iter())
+        .filter(|body| !body.is_intermediate)
+        .filter_map(|body| Some((model.bodies[body.mjcf_body_id].body.name.as_deref()?, body)))
+        .collect();
     let mut bodies = BTreeMap::from([("world", Body { pose: Pose::IDENTITY, mass: 0.0, vertex: None })]);
     for node in root.node.descendants().filter(|node| node.has_tag_name("body")) {
         let element = Element::new(node, root.file);
         let Some(name) = element.attribute("name") else { continue };
-        let is_it = |body: &&rapier3d_mjcf::MjcfBody| {
-            !body.is_intermediate && model.bodies[body.mjcf_body_id].body.name.as_deref() == Some(name)
-        };
-        let Some(found) = robot.bodies.iter().find(is_it) else { continue };
+        let Some(found) = loaded.get(name) else { continue };
         let is_bare = element.children().all(|child| ["joint", "inertial"].contains(&child.tag()));
         let joints: Vec<_> = element.children().filter(|child| child.tag() == "joint").collect();
         let is_led = joints.iter().all(|joint| joint.attribute("type") == Some("slide"));

@@ -17,6 +17,9 @@ use crate::pipeline::DeformableCounters;
 use crate::solver::{BodyProblem, ROUNDING};
 use rapier3d::math::Vector;
 
+/// Part of a node's mean weight that a step leaves unsolved, above which it counts as far from solved.
+const UNSOLVED: f64 = 0.5;
+
 impl StepScratch {
     pub(super) fn advance(&mut self, deformables: &mut DeformableBodySet, h: f64) {
         deformables.reset_attachment_forces();
@@ -127,7 +130,8 @@ pub(super) fn store(
     body.report.residual = problem.residual();
     body.report.tolerance = problem.settings.tolerance.max(ROUNDING) * problem.force_scale();
     let is_automatic = body.settings().solver == Solver::Automatic;
-    body.state.is_unsolved = is_automatic && !problem.is_rejected && problem.is_far_from_solved();
+    let bound = body.report.tolerance.max(UNSOLVED * problem.weight);
+    body.state.is_unsolved = is_automatic && !problem.is_rejected && body.report.residual > bound;
     body.report.guard_retries = problem.guard_retries;
     counters.guard_retries += problem.guard_retries;
     counters.not_converged += usize::from(!body.last_converged());

@@ -105,11 +105,6 @@ impl BodyProblem {
         }
     }
 
-    /// What is left would move a node as half of its weight does.
-    pub fn is_far_from_solved(&self) -> bool {
-        !self.has_converged() && self.residual() > 0.5 * self.weight
-    }
-
     fn settings_of(&self, body: &DeformableBody) -> SolverSettings {
         let is_pinned = !(body.pins.is_empty() && self.prescribed.is_empty());
         body.settings().of_step(match self.is_touched {
