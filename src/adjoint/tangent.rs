@@ -54,13 +54,16 @@ impl Tangent {
             twists.iter().for_each(|twist| twist.add_twisted(model, materials, x, add));
         };
         let place = TangentPlace { x, projected: false, pins, h };
-        let values = assemble_tangent_beside(&elements, &place, symbolic, others, |i, j, block| {
+        let mut values = Vec::new();
+        assemble_tangent_beside(&elements, &place, (symbolic, &mut values), others, |i, j, block| {
             beside.push((i, j, *block));
         });
         self.values = None;
         self.factor = symbolic.factorize(&values, &mut self.scratch).ok();
         if self.factor.is_none() {
-            let projected = assemble_tangent(&elements, x, true, pins, h, symbolic);
+            let mut projected = Vec::new();
+            let place = TangentPlace { projected: true, ..place };
+            assemble_tangent(&elements, &place, symbolic, &mut projected);
             self.factor = symbolic.factorize(&projected, &mut self.scratch).ok();
             self.values = Some(values);
         }
@@ -206,7 +209,9 @@ mod tests {
             assert!(tangent.update(&model, &record, &pins));
             assert_eq!(tangent.values.is_none(), is_definite);
             let symbolic = &tangent.symbolic;
-            let values = assemble_tangent(&elements, &x, false, &pins, 1.0, symbolic);
+            let mut values = Vec::new();
+            let place = TangentPlace { x: &x, projected: false, pins: &pins, h: 1.0 };
+            assemble_tangent(&elements, &place, symbolic, &mut values);
             let mut b: Vec<f64> = (0..3 * x.len()).map(|k| ((k * 7919) % 101) as f64 - 50.0).collect();
             pins.iter().for_each(|pin| b[3 * *pin as usize..][..3].fill(0.0));
             let mut z = b.clone();

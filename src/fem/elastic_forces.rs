@@ -70,9 +70,10 @@ pub(crate) fn add_forces(elements: &Elements<'_>, at: &Evaluation<'_>, force: &m
         }
     }
     if !(model.triangles.is_empty() && model.stencils.is_empty()) {
-        let StiffnessDamping { stretches, ratios, .. } = at.damping;
-        elastic.evaluated += model.triangles.len() + model.stencils.len();
-        elastic.energy += thin_elements::add_forces(elements, stretches, ratios, at.x, force);
+        let limit = at.limit - elastic.energy;
+        let thin = thin_elements::add_forces(elements, &Evaluation { limit, ..*at }, force);
+        elastic.evaluated += thin.evaluated;
+        elastic.energy += thin.energy;
     }
     elastic
 }

@@ -1,8 +1,10 @@
 //! Sheets, rods, springs and fibres: their elements, made of a structure, and their energy and forces.
 
+use super::elastic_forces::{Elastic, Evaluation};
 use super::model::Elements;
 use super::regions::Region;
 use super::stencils::Stencil;
+use super::stiffness_damping::StiffnessDamping;
 use super::stretches::Stretches;
 use crate::energy::membrane::Membrane;
 use crate::energy::stencil::{LengthEnergy, StencilKind};
@@ -58,20 +60,32 @@ pub(super) fn length_energy(
     LengthEnergy { length, weight, limits }
 }
 
-/// Adds the forces \[N\] of a body's thin elements at positions `x`; returns their energy \[J\]. `ratios` are β/h of the regions.
-pub(super) fn add_forces(
-    elements: &Elements<'_>,
-    damping: &Stretches,
-    ratios: &[f64],
+/// Adds the forces \[N\] of a body's thin elements.
+pub(super) fn add_forces(elements: &Elements<'_>, at: &Evaluation<'_>, force: &mut [Vec3]) -> Elastic {
+    let Elements { model, materials, .. } = elements;
+    let StiffnessDamping { stretches, ratios, .. } = at.damping;
+    let mut elastic = Elastic { energy: 0.0, least_trace: 3.0, evaluated: 0 };
+    for (k, (region, material)) in model.regions.iter().zip(*materials).enumerate() {
+        let ratio = ratios.get(k).copied().unwrap_or(0.0);
+        elastic.energy += add_triangles(region, elements, material, (stretches, ratio), at.x, force);
+        elastic.evaluated += region.triangles.len();
+        if elastic.energy > at.limit {
+            return Elastic { energy: f64::INFINITY, ..elastic };
+        }
+    }
+    elastic.energy += add_stencils(elements, (stretches, ratios), at.x, force);
+    elastic.evaluated += model.stencils.len();
+    elastic
+}
+
+/// Those of what keeps a length. `ratios` are β/h of the regions.
+fn add_stencils(
+    Elements { model, materials, activations }: &Elements<'_>,
+    (damping, ratios): (&Stretches, &[f64]),
     x: &[Vec3],
     force: &mut [Vec3],
 ) -> f64 {
-    let Elements { model, materials, activations } = elements;
     let mut energy = 0.0;
-    for (k, (region, material)) in model.regions.iter().zip(*materials).enumerate() {
-        let ratio = ratios.get(k).copied().unwrap_or(0.0);
-        energy += add_triangles(region, elements, material, (damping, ratio), x, force);
-    }
     for (k, stencil) in model.stencils.iter().enumerate() {
         let length_energy = length_energy(&stencil, materials, activations);
         let b = stencil.vector(x);

@@ -47,6 +47,8 @@ pub(crate) struct FactorScratch {
     pub(super) ordered: Vec<f64>,
     gathered: Vec<f64>,
     panel: Vec<f64>,
+    /// A factor as faer makes it.
+    made: Vec<f64>,
     pub(super) given: Vec<Lane>,
     pub(super) conjugate: ConjugateScratch,
 }
@@ -110,13 +112,27 @@ impl Symbolic {
         values: &[f64],
         scratch: &mut FactorScratch,
     ) -> Result<Factor, NotPositiveDefinite> {
+        let mut factor = Vec::new();
+        self.factorize_into(&mut factor, values, scratch)?;
+        Ok(Factor::Double(factor))
+    }
+
+    /// Sets the numbers of a double-precision factor, as [`Symbolic::factorize`].
+    pub fn factorize_into(
+        &self,
+        factor: &mut Vec<f64>,
+        values: &[f64],
+        scratch: &mut FactorScratch,
+    ) -> Result<(), NotPositiveDefinite> {
         let Some((pattern, cholesky)) = &self.analysis else { return Err(NotPositiveDefinite) };
         let A = SparseColMatRef::new(pattern.as_ref(), values);
         let need = cholesky.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
-        let mut factor = vec![0.0; cholesky.len_val()];
-        cholesky
+        let mut made = std::mem::take(&mut scratch.made);
+        made.clear();
+        made.resize(cholesky.len_val(), 0.0);
+        let result = cholesky
             .factorize_numeric_llt(
-                &mut factor,
+                &mut made,
                 A,
                 Side::Upper,
                 Default::default(),
@@ -124,14 +140,19 @@ impl Symbolic {
                 scratch.stack(need.unaligned_bytes_required()),
                 Spec::default(),
             )
-            .map_err(|_| NotPositiveDefinite)?;
-        Ok(Factor::Double(self.packed(&mut factor, &mut scratch.panel)))
+            .map(|_| ());
+        if result.is_ok() {
+            self.pack(&mut made, &mut scratch.panel, factor);
+        }
+        scratch.made = made;
+        result.map_err(|_| NotPositiveDefinite)
     }
 
-    /// The numbers as solves want them, from faer's `[T; B]` of every supernode, which is overwritten.
-    fn packed(&self, factor: &mut [f64], inverse: &mut Vec<f64>) -> Vec<f64> {
-        let mut values = vec![0.0; self.supernodes.len()];
-        let mut rest = factor;
+    /// Sets `values` to the numbers as solves want them, from faer's `[T; B]` of every supernode, which is overwritten.
+    fn pack(&self, made: &mut [f64], inverse: &mut Vec<f64>, values: &mut Vec<f64>) {
+        values.clear();
+        values.resize(self.supernodes.len(), 0.0);
+        let mut rest = made;
         for s in 0..self.supernodes.count() {
             let (own, rows) = self.supernodes.nodes(s);
             let (n, m) = (self.d * own.len(), self.d * (own.len() + rows.len()));
@@ -148,9 +169,8 @@ impl Symbolic {
             let mut inverted = MatMut::from_column_major_slice_mut(inverse, n, n);
             invert_lower_triangular(inverted.rb_mut(), triangle.as_ref(), Par::Seq);
             triangle.copy_from(inverted);
-            self.supernodes.pack(s, panel, &mut values);
+            self.supernodes.pack(s, panel, values);
         }
-        values
     }
 
     /// Solves for many columns at once, one after the other in their own order, of which most numbers may
@@ -326,55 +346,4 @@ pub(crate) fn subtract_product(C: &mut [f64], A: &[f64], B: &[f64], [p, q, r]: [
     let (A, B) = (MatRef::from_column_major_slice(A, p, r), MatRef::from_column_major_slice(B, q, r));
     let C = MatMut::from_column_major_slice_mut(C, p, q);
     matmul(C, Accum::Add, A, B.transpose(), -1.0, Par::Seq);
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn factors_solve_what_they_were_made_of(
-            nodes in 1usize..40, d in prop_oneof![Just(1usize), Just(3)], columns in 1usize..4,
-            seed in proptest::collection::vec(-1.0..1.0f64, 200),
-        ) {
-            // Diagonally dominant with a few blocks off the diagonal, each as good as full.
-            let n = d * nodes;
-            let coupled = |i: usize, j: usize| i == j || matches!(i.abs_diff(j) * 7 % 5, 0 | 2);
-            let at = |i: usize, j: usize| match (coupled(i / d, j / d), i == j) {
-                (true, true) => 40.0 * d as f64,
-                (true, false) => seed[(i.max(j) * 13 + i.min(j) * 31) % seed.len()],
-                _ => 0.0,
-            };
-            let (mut starts, mut rows) = (vec![0], vec![]);
-            for j in 0..nodes {
-                rows.extend((0..=j).filter(|&i| coupled(i, j)));
-                starts.push(rows.len());
-            }
-            let mut scratch = FactorScratch::default();
-            let symbolic = Symbolic::new(d, starts, rows).unwrap();
-            let places = symbolic.column_starts().windows(2).enumerate().flat_map(|(j, w)| (w[0]..w[1]).map(move |k| (j, k)));
-            let values: Vec<f64> = places.map(|(j, k)| at(symbolic.rows()[k], j)).collect();
-            let factor = symbolic.factorize(&values, &mut scratch).unwrap();
-            let x: Vec<f64> = (0..n * 3 * columns).map(|k| seed[(k * 3) % seed.len()]).collect();
-            let b: Vec<f64> =
-                (0..x.len()).map(|k| (0..n).map(|j| at(k % n, j) * x[k / n * n + j]).sum()).collect();
-            let mut batch = b.clone();
-            symbolic.solve_batch(&factor, &mut batch, &mut scratch);
-            let mut single = vec![0.0; x.len()];
-            // With one unknown per node three right-hand sides go together.
-            let together = n * 3 / d;
-            for (out, b) in single.chunks_exact_mut(together).zip(b.chunks_exact(together)) {
-                let mut ordered = vec![Lane::default(); nodes];
-                let at = |i: usize, c: usize| if d == 3 { 3 * i + c } else { n * c + i };
-                (0..nodes).for_each(|i| (0..3).for_each(|c| ordered[symbolic.places()[i]].0[c] = b[at(i, c)]));
-                symbolic.solve(&factor, &mut ordered, &mut scratch);
-                (0..nodes).for_each(|i| (0..3).for_each(|c| out[at(i, c)] = ordered[symbolic.places()[i]].0[c]));
-            }
-            for k in 0..x.len() {
-                prop_assert!((single[k] - x[k]).abs() < 1e-13 && (batch[k] - x[k]).abs() < 1e-13);
-            }
-        }
-    }
 }

@@ -7,6 +7,8 @@ mod gauss_seidel;
 mod operator;
 
 mod changed_pins;
+#[cfg(test)]
+mod factor_tests;
 mod factor_values;
 
 mod factor;

@@ -4,7 +4,7 @@
 
 use super::factor::{FactorScratch, Symbolic};
 use super::factor_values::Factor;
-use super::system::{assemble_tangent, pattern_of};
+use super::system::{TangentPlace, assemble_tangent, pattern_of};
 use crate::body::DeformableBody;
 use crate::error::BodyError;
 use crate::fem::{Elements, SystemMatrix};
@@ -96,7 +96,9 @@ impl ShiftedInverse {
         let pins: Vec<u32> = body.pins.iter().map(|pin| pin.node).collect();
         let symbolic = pattern_of(&body.model, SystemMatrix::RestStiffness).ok_or(BodyError::Unstable)?;
         let h = 1.0 / shift.sqrt();
-        let values = assemble_tangent(&elements, &body.state.x, false, &pins, h, &symbolic);
+        let place = TangentPlace { x: &body.state.x, projected: false, pins: &pins, h };
+        let mut values = Vec::new();
+        assemble_tangent(&elements, &place, &symbolic, &mut values);
         let factor = symbolic.factorize(&values, &mut FactorScratch::default());
         let factor = factor.map_err(|_| BodyError::Unstable)?;
         let mut roots: Vec<f64> = body.masses.iter().flat_map(|m| [m.sqrt(); 3]).collect();

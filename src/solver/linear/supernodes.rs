@@ -69,9 +69,15 @@ impl Supernodes {
 
     /// Sets the numbers of a supernode from M by columns.
     pub fn pack(&self, s: usize, M: &[f64], values: &mut [f64]) {
-        let d = self.d;
+        match self.d {
+            1 => self.pack_blocks::<1>(s, M, values),
+            _ => self.pack_blocks::<3>(s, M, values),
+        }
+    }
+
+    fn pack_blocks<const D: usize>(&self, s: usize, M: &[f64], values: &mut [f64]) {
         self.for_each_block(s, |packed, place| {
-            values[packed..packed + d].iter_mut().zip(&M[place..]).for_each(|(v, m)| *v = *m);
+            values[packed..packed + D].copy_from_slice(&M[place..place + D]);
         });
     }
 

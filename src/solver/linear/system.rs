@@ -158,25 +158,23 @@ pub(crate) fn assemble(
     h: f64,
     symbolic: &Symbolic,
 ) -> Vec<f64> {
-    let mut matrix = Upper::new(model, materials, pins, system, h, symbolic);
+    let mut values = Vec::new();
+    let mut matrix = Upper::new(model, materials, pins, system, h, (symbolic, &mut values));
     let elements = Elements { model, materials, activations: &[] };
     let stiffening = |material: &DeformableMaterial| material.stiffening(h);
     add_blocks(&elements, system, stiffening, |i, j, block| matrix.add_elastic(i, j, block));
-    matrix.values
+    values
 }
 
-/// The values of a body's Hessian at `x`, in the order of [`Symbolic::rows`], of `3n` unknowns. Of stiffness
+/// Sets `values` to those of a body's Hessian at `x`, in the order of [`Symbolic::rows`], of `3n` unknowns. Of stiffness
 /// damping it has the leading part, β/h of the elastic one.
 pub(crate) fn assemble_tangent(
     elements: &Elements<'_>,
-    x: &[Vec3],
-    projected: bool,
-    pins: &[u32],
-    h: f64,
+    place: &TangentPlace<'_>,
     symbolic: &Symbolic,
-) -> Vec<f64> {
-    let place = TangentPlace { x, projected, pins, h };
-    assemble_tangent_beside(elements, &place, symbolic, |_| (), |_, _, _| ())
+    values: &mut Vec<f64>,
+) {
+    assemble_tangent_beside(elements, place, (symbolic, values), |_| (), |_, _, _| ());
 }
 
 /// Where a tangent is taken.
@@ -194,13 +192,13 @@ pub(crate) struct TangentPlace<'a> {
 pub(crate) fn assemble_tangent_beside(
     elements: &Elements<'_>,
     place: &TangentPlace<'_>,
-    symbolic: &Symbolic,
+    into: (&Symbolic, &mut Vec<f64>),
     more: impl FnOnce(&mut dyn FnMut(usize, usize, &Mat3)),
     mut beside: impl FnMut(usize, usize, &Mat3),
-) -> Vec<f64> {
+) {
     let Elements { model, materials, .. } = elements;
     let TangentPlace { x, projected, pins, h } = *place;
-    let mut matrix = Upper::new(model, materials, pins, SystemMatrix::RestStiffness, h, symbolic);
+    let mut matrix = Upper::new(model, materials, pins, SystemMatrix::RestStiffness, h, into);
     let stiffening = |material: &DeformableMaterial| material.stiffening(h);
     let mut add = |i: usize, j: usize, block: &Mat3| {
         if matrix.pinned[i] {
@@ -213,7 +211,6 @@ pub(crate) fn assemble_tangent_beside(
     };
     add_tangents(elements, x, projected, stiffening, &mut add);
     more(&mut add);
-    matrix.values
 }
 
 /// Condition up to which a single-precision factor serves by itself: the softest mode is then off by
@@ -261,7 +258,9 @@ fn condition(body: &DeformableBody, h: f64, symbolic: &Symbolic, values: &[f64])
 /// The upper triangle being filled, block by block.
 struct Upper<'a> {
     symbolic: &'a Symbolic,
-    values: Vec<f64>,
+    /// Of each node those that it is coupled with, ascending: of these the ones before it are its column's blocks.
+    coupling: &'a [Vec<u32>],
+    values: &'a mut [f64],
     pinned: Vec<bool>,
     d: usize,
 }
@@ -269,17 +268,18 @@ struct Upper<'a> {
 impl<'a> Upper<'a> {
     /// With the inertia in it, and the identity for pinned nodes.
     fn new(
-        model: &DeformableModel,
+        model: &'a DeformableModel,
         materials: &[DeformableMaterial],
         pins: &[u32],
         system: SystemMatrix,
         h: f64,
-        symbolic: &'a Symbolic,
+        (symbolic, values): (&'a Symbolic, &'a mut Vec<f64>),
     ) -> Self {
         let mut pinned = vec![false; model.rest.len()];
         pins.iter().for_each(|&p| pinned[p as usize] = true);
-        let values = vec![0.0; symbolic.rows().len()];
-        let mut matrix = Self { symbolic, values, pinned, d: dimension(system) };
+        values.clear();
+        values.resize(symbolic.rows().len(), 0.0);
+        let mut matrix = Self { symbolic, coupling: &model.coupling, values, pinned, d: dimension(system) };
         for (j, inertia) in node_inertia(model, materials, h).into_iter().enumerate() {
             let diagonal = if matrix.pinned[j] { 1.0 } else { inertia };
             matrix.add(j, j, &Mat3::from_diagonal_element(diagonal));
@@ -295,18 +295,28 @@ impl<'a> Upper<'a> {
     }
 
     /// Adds the block between row node i and column node j ≤ i of the symmetric matrix, where it
-    /// stands above the diagonal: transposed.
+    /// stands above the diagonal: transposed. What its pattern has no place for is left out.
     fn add(&mut self, i: usize, j: usize, block: &Mat3) {
         let d = self.d;
-        let starts = self.symbolic.column_starts();
+        // Counted, not searched for: a node has some ten neighbours, and branches that are not foreseen cost more.
+        let node = j as u32;
+        let before = self.coupling[i].iter().map(|&other| u32::from(other < node)).sum::<u32>() as usize;
+        if i != j && self.coupling[i].get(before) != Some(&node) {
+            return;
+        }
+        let starts = &self.symbolic.column_starts()[d * i..d * (i + 1)];
         // The block stands at the same place in all of its columns.
-        let first = starts[d * i]..starts[d * i + 1];
-        let Ok(place) = self.symbolic.rows()[first].binary_search(&(d * j)) else { return };
-        for r in 0..d {
-            let column = starts[d * i + r] + place;
-            let count = if i == j { r + 1 } else { d };
-            for c in 0..count {
-                self.values[column + c] += block[(r, c)];
+        for (r, (start, row)) in starts.iter().zip(block.row_iter()).enumerate() {
+            let first = start + d * before;
+            match (i == j, d) {
+                (false, 3) => {
+                    let column = &mut self.values[first..first + 3];
+                    (0..3).for_each(|c| column[c] += row[c]);
+                }
+                (is_diagonal, _) => {
+                    let column = &mut self.values[first..first + if is_diagonal { r + 1 } else { d }];
+                    column.iter_mut().zip(row.iter()).for_each(|(value, k)| *value += k);
+                }
             }
         }
     }
