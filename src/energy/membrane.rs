@@ -6,7 +6,7 @@
 use super::Lame;
 use super::orthotropic::PlaneStress;
 use super::strain_limit::excess;
-use crate::math::{Mat2, Mat3x2, Vec3, symmetric_eigen2};
+use crate::math::{Mat2, Mat3x2, Vec3};
 use nalgebra::Matrix4;
 
 /// The energy of a sheet's triangles.
@@ -106,11 +106,11 @@ impl Membrane {
         }
         let basis = |i: usize, j: usize| U[i] * V.column(j).transpose();
         let normal = U[0].cross(&U[1]);
-        let (stiffnesses, vectors) = symmetric_eigen2(&curvature);
+        let stretching = curvature.symmetric_eigen();
         let stretch = |k: usize| {
-            let e = vectors.column(k);
+            let e = stretching.eigenvectors.column(k);
             let shape = basis(0, 0) * e[0] + basis(1, 1) * e[1];
-            MembraneMode { stiffness: stiffnesses[k], shape }
+            MembraneMode { stiffness: stretching.eigenvalues[k], shape }
         };
         let size = s[0].max(s[1]).max(COLLAPSED);
         let half = std::f64::consts::FRAC_1_SQRT_2;
@@ -148,7 +148,7 @@ impl Membrane {
             (0..2).for_each(|k| tilts[(k, k)] += beyond[k] / s[k].max(COLLAPSED * size));
         }
         let normal = U[0].cross(&U[1]);
-        let (plane, (tilts, axes)) = (plane.symmetric_eigen(), symmetric_eigen2(&tilts));
+        let (plane, tilts) = (plane.symmetric_eigen(), tilts.symmetric_eigen());
         std::array::from_fn(|k| match k.checked_sub(4) {
             None => {
                 let q = plane.eigenvectors.column(k);
@@ -156,7 +156,10 @@ impl Membrane {
                 let shape = in_plane + U[1] * (V.column(0) * q[1] + V.column(1) * q[3]).transpose();
                 MembraneMode { stiffness: plane.eigenvalues[k], shape }
             }
-            Some(k) => MembraneMode { stiffness: tilts[k], shape: normal * (V * axes.column(k)).transpose() },
+            Some(k) => MembraneMode {
+                stiffness: tilts.eigenvalues[k],
+                shape: normal * (V * tilts.eigenvectors.column(k)).transpose(),
+            },
         })
     }
 
@@ -205,7 +208,7 @@ pub(crate) fn principal_axes(F: &Mat3x2) -> ([Vec3; 2], [f64; 2], Mat2) {
     if !C.iter().all(|v| v.is_finite()) {
         return ([Vec3::x(), Vec3::y()], [1.0; 2], Mat2::identity());
     }
-    let (_, V) = symmetric_eigen2(&C);
+    let V = C.symmetric_eigen().eigenvectors;
     let (a, b) = (F * V.column(0), F * V.column(1));
     let stretches = [a.norm(), b.norm()];
     let (long, short) = if stretches[0] >= stretches[1] { (a, b) } else { (b, a) };

@@ -56,8 +56,8 @@ impl LengthEnergy {
         (energy, direction * (self.weight * by + limit * beyond))
     }
 
-    /// Second derivative over b; with `projected` without its negative part.
-    pub fn tangent(&self, b: &Vec3, projected: bool) -> Mat3 {
+    /// Second derivative over b.
+    pub fn tangent(&self, b: &Vec3) -> Mat3 {
         let now = b.norm();
         if self.length == 0.0 || now == 0.0 {
             return Mat3::from_diagonal_element(self.weight);
@@ -68,8 +68,7 @@ impl LengthEnergy {
         let limit = self.limits.map_or(0.0, |(_, weight)| weight);
         let stiffness = self.weight + if beyond == 0.0 { 0.0 } else { limit };
         let tension = self.weight * (now - self.length) + limit * beyond;
-        let across = if projected { (tension / now).max(0.0) } else { tension / now };
-        along * stiffness + (Mat3::identity() - along) * across
+        along * stiffness + (Mat3::identity() - along) * (tension / now)
     }
 
     fn beyond(&self, length: f64) -> f64 {
@@ -99,7 +98,7 @@ mod tests {
             // Central differences: 1e-12 · third derivative (to 1e3) and 1e-16/1e-6 of rounding.
             prop_assert!(((ahead.0 - behind.0) / (2.0 * eps) - work).abs() < 1e-7);
             let slope = (ahead.1 - behind.1) / (2.0 * eps);
-            prop_assert!((slope - length_energy.tangent(&b, false) * d).norm() < 1e-6);
+            prop_assert!((slope - length_energy.tangent(&b) * d).norm() < 1e-6);
         }
     }
 

@@ -156,12 +156,12 @@ impl ElementMultipliers {
         for (k, (stencil, multiplier)) in model.stencils.iter().zip(&mut self.stencils).enumerate() {
             let own = length_energy(&stencil, materials, activations);
             let b = stencil.vector(x);
-            let (mut pull, mut tangent) = (own.response(&b).1, own.tangent(&b, false));
+            let (mut pull, mut tangent) = (own.response(&b).1, own.tangent(&b));
             if let Some(&length) = damping.stretches.lengths.get(k) {
                 let weight = stencil.mean(|region| damping.ratios[region as usize]) * own.weight;
                 let damper = LengthEnergy { length, weight, limits: None };
                 pull += damper.response(&b).1;
-                tangent += damper.tangent(&b, false);
+                tangent += damper.tangent(&b);
             }
             let moved: f64 = stencil.terms().map(|(n, c)| c * c * w[n]).sum();
             let push = if let Some(direction) = length_direction(&own, &b) {

@@ -2,7 +2,6 @@
 
 use super::model::Elements;
 use super::solid_elements::SolidElement;
-use super::stencils::Stencil;
 use super::thin_elements::{length_energy, membrane};
 use crate::energy::membrane::MembraneMode;
 use crate::energy::{ElementEnergy, Mode, modes, with_energy};
@@ -18,9 +17,8 @@ pub(crate) fn add_tangents(
     stiffening: impl Fn(&DeformableMaterial) -> f64,
     mut add: impl FnMut(usize, usize, &Mat3),
 ) {
-    let Elements { model, materials, .. } = elements;
+    let Elements { model, materials, activations } = elements;
     let kept = |stiffness: f64| if projected { stiffness.max(0.0) } else { stiffness };
-    let stiffenings: Vec<f64> = materials.iter().map(&stiffening).collect();
     let mut sides = Vec::new();
     model.for_each_energy(materials, |law, element| {
         let (material, lame) = (law.material, law.lame);
@@ -38,37 +36,19 @@ pub(crate) fn add_tangents(
         let modes: [MembraneMode; 6] = membrane(material).modes(&triangle.deformation_gradient(x));
         sides.clear();
         sides.extend(modes.iter().flat_map(|m| triangle.gradients.map(|g| m.shape * g)));
-        let scale = triangle.volume * stiffenings[triangle.region as usize];
+        let scale = triangle.volume * stiffening(material);
         let weights = modes.map(|m| kept(m.stiffness) * scale);
         add_products(&triangle.nodes, &weights, &sides, &mut add);
     }
-    add_stencils(elements, x, projected, &stiffenings, &mut add);
-}
-
-/// The blocks of what keeps a length. Bends of a sheet are three to a triangle, over the same nodes: their blocks are added up first.
-fn add_stencils(
-    Elements { model, materials, activations }: &Elements<'_>,
-    x: &[Vec3],
-    projected: bool,
-    stiffenings: &[f64],
-    add: &mut impl FnMut(usize, usize, &Mat3),
-) {
-    let mut rest = model.stencils.iter().peekable();
-    let mut alike: Vec<(Mat3, &[f64])> = Vec::new();
-    while let Some(first) = rest.next() {
-        let tangent = |stencil: &Stencil<'_>| {
-            let stiffening = stencil.mean(|region| stiffenings[region as usize]);
-            length_energy(stencil, materials, activations).tangent(&stencil.vector(x), projected) * stiffening
-        };
-        alike.clear();
-        alike.push((tangent(&first), first.coefficients));
-        while let Some(next) = rest.next_if(|next| next.nodes == first.nodes) {
-            alike.push((tangent(&next), next.coefficients));
+    for stencil in model.stencils.iter() {
+        let stiffening = stencil.mean(|region| stiffening(&materials[region as usize]));
+        let mut K = length_energy(&stencil, materials, activations).tangent(&stencil.vector(x)) * stiffening;
+        if projected {
+            K = semidefinite(&K);
         }
-        for (a, &i) in first.nodes.iter().enumerate() {
-            for (b, &j) in first.nodes.iter().enumerate().filter(|(_, j)| **j <= i) {
-                let sum = |sum: Mat3, (K, c): &(Mat3, &[f64])| sum + K * (c[a] * c[b]);
-                add(i as usize, j as usize, &alike.iter().fold(Mat3::zeros(), sum));
+        for (i, a) in stencil.terms() {
+            for (j, b) in stencil.terms().filter(|(j, _)| *j <= i) {
+                add(i, j, &(K * (a * b)));
             }
         }
     }
@@ -85,6 +65,15 @@ fn add_products(nodes: &[u32], weights: &[f64], sides: &[Vec3], add: &mut impl F
             add(i as usize, j as usize, &block);
         }
     }
+}
+
+fn semidefinite(K: &Mat3) -> Mat3 {
+    let eigen = K.symmetric_eigen();
+    if eigen.eigenvalues.min() >= 0.0 {
+        return *K;
+    }
+    let V = eigen.eigenvectors;
+    V * Mat3::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0))) * V.transpose()
 }
 
 #[cfg(test)]

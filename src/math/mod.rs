@@ -7,8 +7,6 @@ mod vectorized;
 pub(crate) use vectorized::vectorized;
 
 pub(crate) mod dense;
-mod eigen2;
-pub(crate) use eigen2::symmetric_eigen2;
 #[cfg(feature = "serde-serialize")]
 pub(crate) mod finite_or_none;
 pub(crate) mod lanes;
