@@ -72,8 +72,7 @@ pub(crate) fn add_forces(elements: &Elements<'_>, at: &Evaluation<'_>, force: &m
     if !(model.triangles.is_empty() && model.stencils.is_empty()) {
         let limit = at.limit - elastic.energy;
         let thin = thin_elements::add_forces(elements, &Evaluation { limit, ..*at }, force);
-        elastic.evaluated += thin.evaluated;
-        elastic.energy += thin.energy;
+        elastic.add(&thin);
     }
     elastic
 }

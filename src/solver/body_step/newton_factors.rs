@@ -44,8 +44,8 @@ pub(crate) struct NewtonFactors {
     spare: Vec<Vec<f64>>,
 }
 
-/// Numbers of the largest factor whose memory is kept for the next one. New memory costs a flag of 357 vertices (1.3e5 numbers) a
-/// fourth of its step; a factor ten times this size is made in some 0.1 s, of which its memory is a hundredth.
+/// Numbers of the largest factor whose memory is kept for the next one, 8 MB: what is larger is given back. New memory costs a flag of 357
+/// vertices (1.3e5 numbers) a fourth of its step.
 const KEPT_NUMBERS: usize = 1 << 20;
 
 struct OwnFactor {

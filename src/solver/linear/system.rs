@@ -298,7 +298,7 @@ impl<'a> Upper<'a> {
     /// stands above the diagonal: transposed. What its pattern has no place for is left out.
     fn add(&mut self, i: usize, j: usize, block: &Mat3) {
         let d = self.d;
-        // Counted, not searched for: a node has some ten neighbours, and branches that are not foreseen cost more.
+        // Counted, not searched for: of the few nodes around one, that is quicker.
         let node = j as u32;
         let before = self.coupling[i].iter().map(|&other| u32::from(other < node)).sum::<u32>() as usize;
         if i != j && self.coupling[i].get(before) != Some(&node) {
@@ -307,17 +307,9 @@ impl<'a> Upper<'a> {
         let starts = &self.symbolic.column_starts()[d * i..d * (i + 1)];
         // The block stands at the same place in all of its columns.
         for (r, (start, row)) in starts.iter().zip(block.row_iter()).enumerate() {
-            let first = start + d * before;
-            match (i == j, d) {
-                (false, 3) => {
-                    let column = &mut self.values[first..first + 3];
-                    (0..3).for_each(|c| column[c] += row[c]);
-                }
-                (is_diagonal, _) => {
-                    let column = &mut self.values[first..first + if is_diagonal { r + 1 } else { d }];
-                    column.iter_mut().zip(row.iter()).for_each(|(value, k)| *value += k);
-                }
-            }
+            let count = if i == j { r + 1 } else { d };
+            let column = &mut self.values[start + d * before..][..count];
+            column.iter_mut().zip(row.iter()).for_each(|(value, k)| *value += k);
         }
     }
 }
