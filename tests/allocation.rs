@@ -102,6 +102,11 @@ fn beam() -> DeformableBodyBuilder {
         .translation(Vector::Y * 3.0)
 }
 
+/// On a thread of rayon's own: handing work to others takes memory for its queues.
+fn on_one_thread(count: impl FnOnce() -> usize + Send) -> usize {
+    rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(count)
+}
+
 #[test]
 fn the_counter_counts() {
     assert!(allocations(vec![cube(1e6, Vector::Y * 0.21)], &[], 5, 5) > 0);
@@ -125,9 +130,7 @@ fn a_box_glued_on_a_cube_allocates_nothing() {
 #[test]
 fn a_cube_on_a_cube_allocates_nothing() {
     let cubes = vec![cube(1e6, Vector::Y * 0.2), cube(1e6, Vector::new(0.02, 0.6, 0.01))];
-    // On a thread of rayon's own: handing work to others takes memory for its queues.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert_eq!(pool.install(|| allocations(cubes, &[], 180, 40)), 0);
+    assert_eq!(on_one_thread(|| allocations(cubes, &[], 180, 40)), 0);
 }
 
 #[test]
@@ -151,4 +154,34 @@ fn a_sealed_hollow_cube_on_the_floor_allocates_nothing() {
     let body =
         body.material(DeformableMaterial::new(1e6, 0.3).mass_damping(2.0)).translation(Vector::Y * 0.2);
     assert_eq!(allocations(vec![body], &[], 180, 40), 0);
+}
+
+fn newton(builder: DeformableBodyBuilder) -> DeformableBodyBuilder {
+    builder.settings(SolverSettings::default().solver(Solver::Newton).max_iterations(3))
+}
+
+#[test]
+fn a_swinging_beam_by_newtons_method_allocates_nothing() {
+    assert_eq!(allocations(vec![newton(beam().pinned(|x| x.x < -0.49))], &[], 120, 60), 0);
+}
+
+#[test]
+fn a_resting_cube_by_newtons_method_allocates_nothing() {
+    assert_eq!(allocations(vec![newton(cube(1e6, Vector::Y * 0.2))], &[], 120, 40), 0);
+}
+
+#[test]
+fn a_box_on_a_cube_by_newtons_method_allocates_nothing() {
+    let cube = newton(cube(1e6, Vector::Y * 0.2));
+    assert_eq!(on_one_thread(|| allocations(vec![cube], &[Vector::Y * 0.5], 180, 40)), 0);
+}
+
+/// Of more than 256 vertices: Newton's method, while it hangs.
+#[test]
+fn a_hanging_flag_allocates_nothing() {
+    let flag = DeformableBodyBuilder::cloth([0.3, 0.2], [20, 16], 5e-4)
+        .material(DeformableMaterial::new(1e7, 0.3).density(300.0).mass_damping(4.0))
+        .can_sleep(false)
+        .translation(Vector::Y * 2.0);
+    assert_eq!(allocations(vec![flag.pinned(|x| x.x < -0.299)], &[], 240, 60), 0);
 }

@@ -7,7 +7,8 @@ use super::record::StepRecord;
 use crate::fem::{DeformableModel, Elements, SystemMatrix};
 use crate::math::{Mat3, Vec3};
 use crate::solver::linear::{
-    Factor, FactorScratch, Symbolic, TangentPlace, assemble_tangent, assemble_tangent_beside, pattern_of,
+    Factor, FactorScratch, MatrixValues, Symbolic, TangentPlace, assemble_tangent, assemble_tangent_beside,
+    pattern_of,
 };
 
 /// Residual of GMRES over its right-hand side, and its iterations at the most.
@@ -54,18 +55,18 @@ impl Tangent {
             twists.iter().for_each(|twist| twist.add_twisted(model, materials, x, add));
         };
         let place = TangentPlace { x, projected: false, pins, h };
-        let mut values = Vec::new();
-        assemble_tangent_beside(&elements, &place, (symbolic, &mut values), others, |i, j, block| {
+        let mut matrix = MatrixValues::default();
+        assemble_tangent_beside(&elements, &place, (symbolic, &mut matrix), others, |i, j, block| {
             beside.push((i, j, *block));
         });
         self.values = None;
-        self.factor = symbolic.factorize(&values, &mut self.scratch).ok();
+        self.factor = symbolic.factorize(&matrix.values, &mut self.scratch).ok();
         if self.factor.is_none() {
-            let mut projected = Vec::new();
+            let mut projected = MatrixValues::default();
             let place = TangentPlace { projected: true, ..place };
             assemble_tangent(&elements, &place, symbolic, &mut projected);
-            self.factor = symbolic.factorize(&projected, &mut self.scratch).ok();
-            self.values = Some(values);
+            self.factor = symbolic.factorize(&projected.values, &mut self.scratch).ok();
+            self.values = Some(matrix.values);
         }
         self.factor.is_some() && self.find_responses()
     }
@@ -209,14 +210,14 @@ mod tests {
             assert!(tangent.update(&model, &record, &pins));
             assert_eq!(tangent.values.is_none(), is_definite);
             let symbolic = &tangent.symbolic;
-            let mut values = Vec::new();
+            let mut matrix = MatrixValues::default();
             let place = TangentPlace { x: &x, projected: false, pins: &pins, h: 1.0 };
-            assemble_tangent(&elements, &place, symbolic, &mut values);
+            assemble_tangent(&elements, &place, symbolic, &mut matrix);
             let mut b: Vec<f64> = (0..3 * x.len()).map(|k| ((k * 7919) % 101) as f64 - 50.0).collect();
             pins.iter().for_each(|pin| b[3 * *pin as usize..][..3].fill(0.0));
             let mut z = b.clone();
             assert!(tangent.solve(&mut z));
-            let left = product(&tangent.symbolic, &values, &z);
+            let left = product(&tangent.symbolic, &matrix.values, &z);
             let error = left.iter().zip(&b).map(|(l, b)| (l - b).abs()).fold(0.0, f64::max);
             // Of 50 N; the preconditioned residual is below 1e-12, times the condition of 1e4.
             assert!(error < 1e-6, "{squeeze}: {error:e}");

@@ -198,16 +198,27 @@ impl DeformableModel {
         materials: &[DeformableMaterial],
         weight: impl Fn(&DeformableMaterial) -> f64,
     ) -> Vec<f64> {
+        let mut sums = vec![0.0; self.rest.len()];
+        self.for_each_weight(materials, weight, |node, weight| sums[node] += weight);
+        sums
+    }
+
+    /// Gives every node its volumes times `weight` of their materials, one after the other.
+    pub(crate) fn for_each_weight(
+        &self,
+        materials: &[DeformableMaterial],
+        weight: impl Fn(&DeformableMaterial) -> f64,
+        mut add: impl FnMut(usize, f64),
+    ) {
         if let [material] = materials {
             let weight = weight(material);
-            return self.node_volumes.iter().map(|volume| weight * volume).collect();
+            self.node_volumes.iter().enumerate().for_each(|(node, volume)| add(node, weight * volume));
+            return;
         }
-        let mut sums = vec![0.0; self.rest.len()];
         for (region, material) in self.regions.iter().zip(materials) {
             let weight = weight(material);
-            region.shares.iter().for_each(|(node, volume)| sums[*node as usize] += weight * volume);
+            region.shares.iter().for_each(|(node, volume)| add(*node as usize, weight * volume));
         }
-        sums
     }
 
     /// Mass-proportional damping α [1/s] of the whole: by mass the mean of the materials'.

@@ -9,17 +9,17 @@ use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3};
 
 /// Calls `add(i, j, K)` with the blocks `K = −∂fᵢ/∂xⱼ` [N/m], i ≥ j, of every element at positions `x`. With
-/// `projected` without the modes of negative stiffness: positive semi-definite then.
+/// `projected` without the modes of negative stiffness: positive semi-definite then. `sides` is memory.
 pub(crate) fn add_tangents(
     elements: &Elements<'_>,
     x: &[Vec3],
     projected: bool,
     stiffening: impl Fn(&DeformableMaterial) -> f64,
+    sides: &mut Vec<Vec3>,
     mut add: impl FnMut(usize, usize, &Mat3),
 ) {
     let Elements { model, materials, activations } = elements;
     let kept = |stiffness: f64| if projected { stiffness.max(0.0) } else { stiffness };
-    let mut sides = Vec::new();
     model.for_each_energy(materials, |law, element| {
         let (material, lame) = (law.material, law.lame);
         let SolidElement { nodes, gradients, volume, .. } = *element;
@@ -29,7 +29,7 @@ pub(crate) fn add_tangents(
         sides.clear();
         sides.extend(modes.iter().flat_map(|m| gradients.iter().map(|g| m.shape * g)));
         let scale = volume * stiffening(material);
-        add_products(nodes, &modes.map(|m| kept(m.stiffness) * scale), &sides, &mut add);
+        add_products(nodes, &modes.map(|m| kept(m.stiffness) * scale), sides, &mut add);
     });
     for triangle in &model.triangles {
         let material = &materials[triangle.region as usize];
@@ -38,7 +38,7 @@ pub(crate) fn add_tangents(
         sides.extend(modes.iter().flat_map(|m| triangle.gradients.map(|g| m.shape * g)));
         let scale = triangle.volume * stiffening(material);
         let weights = modes.map(|m| kept(m.stiffness) * scale);
-        add_products(&triangle.nodes, &weights, &sides, &mut add);
+        add_products(&triangle.nodes, &weights, sides, &mut add);
     }
     for stencil in model.stencils.iter() {
         let stiffening = stencil.mean(|region| stiffening(&materials[region as usize]));
@@ -132,7 +132,7 @@ mod tests {
                 let n = 3 * x.len();
                 let (mut K, mut projected) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
                 for (out, project) in [(&mut K, false), (&mut projected, true)] {
-                    add_tangents(&elements, &x, project, |_| 1.0, |i, j, block| {
+                    add_tangents(&elements, &x, project, |_| 1.0, &mut Vec::new(), |i, j, block| {
                         let mut part = out.view_mut((3 * i, 3 * j), (3, 3));
                         part += block;
                         if i != j {

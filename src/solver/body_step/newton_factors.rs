@@ -5,9 +5,10 @@ use super::problem::BodyProblem;
 use crate::body::Solver;
 use crate::contact::{Constraint, Endpoint};
 use crate::fem::SystemMatrix;
+use crate::mesh::Surface;
 use crate::solver::linear::{
-    CoarseInverse, ComplianceColumns, Factor, FactorCache, FactorScratch, Symbolic, SystemFactor,
-    TangentPlace, assemble_tangent, columns_pay,
+    CoarseInverse, ComplianceColumns, Factor, FactorCache, FactorScratch, MatrixValues, Symbolic,
+    SystemFactor, TangentPlace, assemble_tangent, columns_pay,
 };
 use std::sync::Arc;
 
@@ -38,13 +39,14 @@ pub(crate) struct NewtonFactors {
     made: Vec<Option<OwnFactor>>,
     count: u64,
     scratch: FactorScratch,
-    /// Values of a matrix.
-    values: Vec<f64>,
+    matrix: MatrixValues,
     /// Memory of earlier factors.
-    spare: Vec<Vec<f64>>,
+    spare: Vec<SystemFactor>,
+    /// Surface nodes whose columns are wanted.
+    wanted: Vec<u32>,
 }
 
-/// Numbers of the largest factor whose memory is kept for the next one, 8 MB: what is larger is given back. New memory costs a flag of 357
+/// Numbers of the largest factor, with its columns, whose memory is kept for the next one, 8 MB: what is larger is given back. New memory costs a flag of 357
 /// vertices (1.3e5 numbers) a fourth of its step.
 const KEPT_NUMBERS: usize = 1 << 20;
 
@@ -52,6 +54,27 @@ struct OwnFactor {
     factor: SystemFactor,
     /// All columns that its contacts want are there.
     has_columns: bool,
+}
+
+/// A factor without numbers.
+fn empty_factor(symbolic: &Arc<Symbolic>, surface: &Surface) -> SystemFactor {
+    SystemFactor {
+        symbolic: symbolic.clone(),
+        factor: Arc::new(Factor::Double(Vec::new())),
+        system: SystemMatrix::RestStiffness,
+        columns: ComplianceColumns::new(surface, SystemMatrix::RestStiffness),
+        clusters: None,
+        coarse: CoarseInverse { local: Vec::new(), modes: None },
+        serial: u64::MAX,
+    }
+}
+
+/// The numbers of a factor that nobody else has.
+fn numbers_of(factor: &mut SystemFactor) -> Option<&mut Vec<f64>> {
+    match Arc::get_mut(&mut factor.factor)? {
+        Factor::Double(numbers) => Some(numbers),
+        _ => None,
+    }
 }
 
 impl NewtonFactors {
@@ -63,11 +86,12 @@ impl NewtonFactors {
     }
 
     fn forget(&mut self, index: usize) {
-        let Some(own) = self.made[index].take() else { return };
-        if let Ok(Factor::Double(numbers)) = Arc::try_unwrap(own.factor.factor)
-            && numbers.len() <= KEPT_NUMBERS
+        let Some(OwnFactor { mut factor, .. }) = self.made[index].take() else { return };
+        let columns = factor.columns.len();
+        if let Some(numbers) = numbers_of(&mut factor)
+            && numbers.len() + columns <= KEPT_NUMBERS
         {
-            self.spare.push(numbers);
+            self.spare.push(factor);
         }
     }
 
@@ -101,40 +125,36 @@ impl NewtonFactors {
         symbolic: &Arc<Symbolic>,
         constraints: impl Iterator<Item = &'a Constraint>,
     ) -> Option<OwnFactor> {
-        let mut numbers = self.spare.pop().unwrap_or_default();
-        let is_made = [false, true]
-            .into_iter()
-            .any(|projected| self.factorize(body, projected, symbolic, &mut numbers));
+        let (pins, surface) = (&body.key.pins, &body.model.surface);
+        let mut factor = self.spare.pop().unwrap_or_else(|| empty_factor(symbolic, surface));
+        let is_made = numbers_of(&mut factor).is_some_and(|numbers| {
+            [false, true].into_iter().any(|projected| self.factorize(body, projected, symbolic, numbers))
+        });
         if !is_made {
-            self.spare.push(numbers);
+            self.spare.push(factor);
             return None;
         }
-        let (pins, factor) = (&body.key.pins, Factor::Double(numbers));
-        let coarse = CoarseInverse::local(pins, symbolic, &self.values);
-        let surface = &body.model.surface;
-        let mut columns = ComplianceColumns::new(surface, SystemMatrix::RestStiffness);
+        self.count += 1;
+        factor.serial = u64::MAX - self.count;
+        factor.symbolic.clone_from(symbolic);
+        factor.coarse.set_local(pins, symbolic, &self.matrix.values);
+        factor.columns.begin_again(surface, SystemMatrix::RestStiffness);
         let nodes = constraints
             .flat_map(|constraint| &constraint.endpoints)
             .filter(|endpoint| endpoint.is_of(index))
             .flat_map(Endpoint::soft_nodes);
-        let mut nodes: Vec<u32> = nodes.map(|(node, _)| surface.index_of_node[node]).collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        let has_columns = columns_pay(symbolic, &factor, &body.model, nodes.len());
+        let mut wanted = std::mem::take(&mut self.wanted);
+        wanted.clear();
+        wanted.extend(nodes.map(|(node, _)| surface.index_of_node[node]));
+        wanted.sort_unstable();
+        wanted.dedup();
+        let has_columns = columns_pay(symbolic, &factor.factor, &body.model, wanted.len());
         if has_columns {
-            let nodes = nodes.into_iter();
-            columns.prepare(&body.model, pins, symbolic, &factor, nodes, &mut self.scratch);
+            let SystemFactor { columns, factor, .. } = &mut factor;
+            let wanted = wanted.iter().copied();
+            columns.prepare(&body.model, pins, symbolic, factor, wanted, &mut self.scratch);
         }
-        self.count += 1;
-        let factor = SystemFactor {
-            symbolic: symbolic.clone(),
-            factor: Arc::new(factor),
-            system: SystemMatrix::RestStiffness,
-            columns,
-            clusters: None,
-            coarse,
-            serial: u64::MAX - self.count,
-        };
+        self.wanted = wanted;
         Some(OwnFactor { factor, has_columns })
     }
 
@@ -147,7 +167,7 @@ impl NewtonFactors {
         numbers: &mut Vec<f64>,
     ) -> bool {
         let place = TangentPlace { x: &body.current.x, projected, pins: &body.key.pins, h: body.h() };
-        assemble_tangent(&body.elements(), &place, symbolic, &mut self.values);
-        symbolic.factorize_into(numbers, &self.values, &mut self.scratch).is_ok()
+        assemble_tangent(&body.elements(), &place, symbolic, &mut self.matrix);
+        symbolic.factorize_into(numbers, &self.matrix.values, &mut self.scratch).is_ok()
     }
 }

@@ -43,6 +43,12 @@ impl CoarseInverse {
     pub fn local(pins: &[u32], symbolic: &Symbolic, values: &[f64]) -> Self {
         Self { local: symbolic.upper(values).local_compliance(symbolic.d, pins), modes: None }
     }
+
+    /// As [`Self::local`], in the memory of another.
+    pub fn set_local(&mut self, pins: &[u32], symbolic: &Symbolic, values: &[f64]) {
+        symbolic.upper(values).set_local_compliance(&mut self.local, symbolic.d, pins);
+        self.modes = None;
+    }
 }
 
 /// Eigenvalues below this part of the largest belong to functions that vanish on the body, as across a sheet. Rigid

@@ -23,11 +23,35 @@ pub(crate) struct ComplianceColumns {
     /// Per surface node: `d` columns of `d·|S|` numbers.
     columns: Vec<Option<Box<[f64]>>>,
     made: usize,
+    /// Memory of columns that were forgotten, all of one length.
+    spare: Vec<Box<[f64]>>,
 }
 
 impl ComplianceColumns {
     pub fn new(surface: &Surface, system: SystemMatrix) -> Self {
-        Self { d: dimension(system), columns: vec![None; surface.nodes.len()], made: 0 }
+        Self { d: dimension(system), columns: vec![None; surface.nodes.len()], made: 0, spare: Vec::new() }
+    }
+
+    /// As [`Self::new`], in the memory of those that are there.
+    pub fn begin_again(&mut self, surface: &Surface, system: SystemMatrix) {
+        let (d, nodes) = (dimension(system), surface.nodes.len());
+        if d != self.d || nodes != self.columns.len() {
+            *self = Self::new(surface, system);
+            return;
+        }
+        self.spare.extend(self.columns.iter_mut().filter_map(Option::take));
+        self.made = 0;
+    }
+
+    /// Numbers that it has memory for.
+    pub fn len(&self) -> usize {
+        (self.made + self.spare.len()) * self.d * self.d * self.columns.len()
+    }
+
+    /// Memory for the columns of a node.
+    fn room(&mut self) -> Box<[f64]> {
+        let len = self.d * self.d * self.columns.len();
+        self.spare.pop().unwrap_or_else(|| vec![0.0; len].into())
     }
 
     /// Whether a surface node has its columns.
@@ -46,15 +70,29 @@ impl ComplianceColumns {
         surface_nodes: impl Iterator<Item = u32>,
         scratch: &mut FactorScratch,
     ) -> usize {
-        let mut missing: Vec<u32> = surface_nodes.filter(|&s| self.columns[s as usize].is_none()).collect();
+        let mut missing = std::mem::take(&mut scratch.missing);
+        missing.clear();
+        missing.extend(surface_nodes.filter(|&s| self.columns[s as usize].is_none()));
         missing.sort_unstable();
         missing.dedup();
-        if missing.is_empty() {
-            return 0;
-        }
+        self.make(model, pins, (symbolic, factor), &missing, scratch);
+        let made = missing.len();
+        scratch.missing = missing;
+        made
+    }
+
+    /// Makes the columns at these surface nodes, which are not there yet.
+    fn make(
+        &mut self,
+        model: &DeformableModel,
+        pins: &[u32],
+        (symbolic, factor): (&Symbolic, &Factor),
+        missing: &[u32],
+        scratch: &mut FactorScratch,
+    ) {
         let (d, nodes) = (self.d, &model.surface.nodes);
         let n = d * model.rest.len();
-        let mut batch = Vec::new();
+        let mut batch = std::mem::take(&mut scratch.batch);
         for chunk in missing.chunks(BATCHES * BATCH / d) {
             let columns = chunk.len().div_ceil(BATCH / d) * BATCH;
             batch.clear();
@@ -66,20 +104,23 @@ impl ComplianceColumns {
             }
             symbolic.solve_batch(factor, &mut batch, scratch);
             for (k, &s) in chunk.iter().enumerate() {
-                // A pinned node does not move: its column is zero, not that of its identity row.
-                if pins.binary_search(&nodes[s as usize]).is_ok() {
-                    self.columns[s as usize] = Some(vec![0.0; d * d * nodes.len()].into());
-                    continue;
+                let mut kept = self.room();
+                let is_pinned = pins.binary_search(&nodes[s as usize]).is_ok();
+                for (c, column) in kept.chunks_exact_mut(d * nodes.len()).enumerate() {
+                    let solved = &batch[n * (d * k + c)..][..n];
+                    for (block, &i) in column.chunks_exact_mut(d).zip(nodes) {
+                        block.copy_from_slice(&solved[d * i as usize..][..d]);
+                    }
+                    // A pinned node does not move: its column is zero, not that of its identity row.
+                    if is_pinned {
+                        column.fill(0.0);
+                    }
                 }
-                let column = |c: usize| &batch[n * (d * k + c)..][..n];
-                let kept = (0..d).flat_map(|c| {
-                    nodes.iter().flat_map(move |&i| (0..d).map(move |r| column(c)[d * i as usize + r]))
-                });
-                self.columns[s as usize] = Some(kept.collect());
+                self.columns[s as usize] = Some(kept);
             }
         }
         self.made += missing.len();
-        missing.len()
+        scratch.batch = batch;
     }
 
     /// As [`ComplianceColumns::prepare`], for changed pins from the columns of their base, which are there.

@@ -49,6 +49,9 @@ pub(crate) struct FactorScratch {
     panel: Vec<f64>,
     /// A factor as faer makes it.
     made: Vec<f64>,
+    /// Right-hand sides, and the nodes that they are of.
+    pub(super) batch: Vec<f64>,
+    pub(super) missing: Vec<u32>,
     pub(super) given: Vec<Lane>,
     pub(super) conjugate: ConjugateScratch,
 }

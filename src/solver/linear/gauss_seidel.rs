@@ -44,10 +44,17 @@ impl<'a> UpperTriangle<'a> {
     /// About how far a unit of force moves the node that it acts on, by what is elastic around it [m/N]: `d` unknowns a
     /// node, zero where it is pinned.
     pub fn local_compliance(&self, d: usize, pins: &[u32]) -> Vec<f64> {
-        let mean = |n: usize| (d * n..d * (n + 1)).map(|j| self.column(j).2).sum::<f64>() / d as f64;
-        let mut local: Vec<f64> = (0..self.len() / d).map(|n| OVER_DIAGONAL / mean(n)).collect();
-        pins.iter().for_each(|&p| local[p as usize] = 0.0);
+        let mut local = Vec::new();
+        self.set_local_compliance(&mut local, d, pins);
         local
+    }
+
+    /// The same, in memory that is there.
+    pub fn set_local_compliance(&self, local: &mut Vec<f64>, d: usize, pins: &[u32]) {
+        let mean = |n: usize| (d * n..d * (n + 1)).map(|j| self.column(j).2).sum::<f64>() / d as f64;
+        local.clear();
+        local.extend((0..self.len() / d).map(|n| OVER_DIAGONAL / mean(n)));
+        pins.iter().for_each(|&p| local[p as usize] = 0.0);
     }
 
     /// `x ← (D + U)⁻¹ D (D + L)⁻¹ x`: a sweep forward and one back, from zero. Its inverse is

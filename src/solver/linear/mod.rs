@@ -44,7 +44,9 @@ pub(crate) use rigid_mode::{SLENDER, rigid_mobility};
 pub(crate) use factor_cache::{FactorCache, FactorId, SystemFactor, columns_pay};
 pub use modes::DeformableMode;
 pub(crate) use preconditioner::{BlockForm, Preconditioner};
-pub(crate) use system::{FactorKey, TangentPlace, assemble_tangent, assemble_tangent_beside, pattern_of};
+pub(crate) use system::{
+    FactorKey, MatrixValues, TangentPlace, assemble_tangent, assemble_tangent_beside, pattern_of,
+};
 pub(crate) use unused_factors::STEPS_KEPT;
 #[cfg(test)]
 pub(crate) use {

@@ -4,7 +4,7 @@
 
 use super::factor::{FactorScratch, Symbolic};
 use super::factor_values::Factor;
-use super::system::{TangentPlace, assemble_tangent, pattern_of};
+use super::system::{MatrixValues, TangentPlace, assemble_tangent, pattern_of};
 use crate::body::DeformableBody;
 use crate::error::BodyError;
 use crate::fem::{Elements, SystemMatrix};
@@ -97,9 +97,9 @@ impl ShiftedInverse {
         let symbolic = pattern_of(&body.model, SystemMatrix::RestStiffness).ok_or(BodyError::Unstable)?;
         let h = 1.0 / shift.sqrt();
         let place = TangentPlace { x: &body.state.x, projected: false, pins: &pins, h };
-        let mut values = Vec::new();
-        assemble_tangent(&elements, &place, &symbolic, &mut values);
-        let factor = symbolic.factorize(&values, &mut FactorScratch::default());
+        let mut matrix = MatrixValues::default();
+        assemble_tangent(&elements, &place, &symbolic, &mut matrix);
+        let factor = symbolic.factorize(&matrix.values, &mut FactorScratch::default());
         let factor = factor.map_err(|_| BodyError::Unstable)?;
         let mut roots: Vec<f64> = body.masses.iter().flat_map(|m| [m.sqrt(); 3]).collect();
         pins.iter().for_each(|&pin| roots[3 * pin as usize..][..3].fill(0.0));

@@ -6,7 +6,7 @@
 //! A pinned node has the identity for its row and column, so every set of pins shares one symbolic
 //! factor.
 
-use super::coefficients::{dimension, node_inertia};
+use super::coefficients::{dimension, for_each_inertia};
 use super::factor::Symbolic;
 use crate::body::{DeformableBody, FactorPrecision, Solver, StepState};
 use crate::energy::Elasticity;
@@ -158,23 +158,33 @@ pub(crate) fn assemble(
     h: f64,
     symbolic: &Symbolic,
 ) -> Vec<f64> {
-    let mut values = Vec::new();
-    let mut matrix = Upper::new(model, materials, pins, system, h, (symbolic, &mut values));
+    let mut made = MatrixValues::default();
+    let mut matrix = Upper::new(model, materials, pins, system, h, (symbolic, &mut made));
     let elements = Elements { model, materials, activations: &[] };
     let stiffening = |material: &DeformableMaterial| material.stiffening(h);
     add_blocks(&elements, system, stiffening, |i, j, block| matrix.add_elastic(i, j, block));
-    values
+    made.values
 }
 
-/// Sets `values` to those of a body's Hessian at `x`, in the order of [`Symbolic::rows`], of `3n` unknowns. Of stiffness
+/// The values of a matrix, in the order of [`Symbolic::rows`], in memory that serves again.
+#[derive(Default)]
+pub(crate) struct MatrixValues {
+    pub values: Vec<f64>,
+    /// By nodes.
+    pinned: Vec<bool>,
+    /// Of the modes of an element.
+    sides: Vec<Vec3>,
+}
+
+/// Sets the values to those of a body's Hessian at `x`, of `3n` unknowns. Of stiffness
 /// damping it has the leading part, β/h of the elastic one.
 pub(crate) fn assemble_tangent(
     elements: &Elements<'_>,
     place: &TangentPlace<'_>,
     symbolic: &Symbolic,
-    values: &mut Vec<f64>,
+    into: &mut MatrixValues,
 ) {
-    assemble_tangent_beside(elements, place, (symbolic, values), |_| (), |_, _, _| ());
+    assemble_tangent_beside(elements, place, (symbolic, into), |_| (), |_, _, _| ());
 }
 
 /// Where a tangent is taken.
@@ -192,13 +202,15 @@ pub(crate) struct TangentPlace<'a> {
 pub(crate) fn assemble_tangent_beside(
     elements: &Elements<'_>,
     place: &TangentPlace<'_>,
-    into: (&Symbolic, &mut Vec<f64>),
+    (symbolic, into): (&Symbolic, &mut MatrixValues),
     more: impl FnOnce(&mut dyn FnMut(usize, usize, &Mat3)),
     mut beside: impl FnMut(usize, usize, &Mat3),
 ) {
     let Elements { model, materials, .. } = elements;
     let TangentPlace { x, projected, pins, h } = *place;
-    let mut matrix = Upper::new(model, materials, pins, SystemMatrix::RestStiffness, h, into);
+    let mut sides = std::mem::take(&mut into.sides);
+    let mut matrix =
+        Upper::new(model, materials, pins, SystemMatrix::RestStiffness, h, (symbolic, &mut *into));
     let stiffening = |material: &DeformableMaterial| material.stiffening(h);
     let mut add = |i: usize, j: usize, block: &Mat3| {
         if matrix.pinned[i] {
@@ -209,8 +221,9 @@ pub(crate) fn assemble_tangent_beside(
         }
         matrix.add_elastic(i, j, block);
     };
-    add_tangents(elements, x, projected, stiffening, &mut add);
+    add_tangents(elements, x, projected, stiffening, &mut sides, &mut add);
     more(&mut add);
+    into.sides = sides;
 }
 
 /// Condition up to which a single-precision factor serves by itself: the softest mode is then off by
@@ -261,7 +274,7 @@ struct Upper<'a> {
     /// Of each node those that it is coupled with, ascending: of these the ones before it are its column's blocks.
     coupling: &'a [Vec<u32>],
     values: &'a mut [f64],
-    pinned: Vec<bool>,
+    pinned: &'a [bool],
     d: usize,
 }
 
@@ -273,16 +286,22 @@ impl<'a> Upper<'a> {
         pins: &[u32],
         system: SystemMatrix,
         h: f64,
-        (symbolic, values): (&'a Symbolic, &'a mut Vec<f64>),
+        (symbolic, into): (&'a Symbolic, &'a mut MatrixValues),
     ) -> Self {
-        let mut pinned = vec![false; model.rest.len()];
+        let MatrixValues { values, pinned, .. } = into;
+        pinned.clear();
+        pinned.resize(model.rest.len(), false);
         pins.iter().for_each(|&p| pinned[p as usize] = true);
         values.clear();
         values.resize(symbolic.rows().len(), 0.0);
         let mut matrix = Self { symbolic, coupling: &model.coupling, values, pinned, d: dimension(system) };
-        for (j, inertia) in node_inertia(model, materials, h).into_iter().enumerate() {
-            let diagonal = if matrix.pinned[j] { 1.0 } else { inertia };
-            matrix.add(j, j, &Mat3::from_diagonal_element(diagonal));
+        for_each_inertia(model, materials, h, |j, inertia| {
+            if !matrix.pinned[j] {
+                matrix.add(j, j, &Mat3::from_diagonal_element(inertia));
+            }
+        });
+        for j in (0..matrix.pinned.len()).filter(|j| pinned[*j]) {
+            matrix.add(j, j, &Mat3::identity());
         }
         matrix
     }
