@@ -3,35 +3,42 @@
 use crate::arrays::{Array1, Array2, Triple, count, grid, image, points, rows, triple};
 use crate::errors::{Failure, bad_value, without_panic};
 use crate::handles::{PyCableHandle, PyColliderHandle, PyDeformableHandle};
-use crate::world::{World, in_turns};
-use foible3d::{CableGradient, DeformableGradient, DeformableTape, MaterialGradient, StepGradient};
+use crate::world::{Inner, World, here, in_turns, step_with};
+use foible3d::{
+    CableGradient, DeformableGradient, DeformableLoss, DeformableTape, DeformableWorld, MaterialGradient,
+    StepGradient,
+};
 use numpy::{PyArray1, PyArray3};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
+use rapier3d::pipeline::PhysicsWorld;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Steps of one body of a world, recorded so that the derivatives of a loss with respect to what the body is made of, how it began and
 /// what acted on it can be had: exact ones of the converged steps, contact included.
 ///
 /// Steps have to be solved far: a ``tolerance`` of 1e-10 or less and ``max_iterations`` enough, as ``Fidelity.REFERENCE`` has them. What has no
-/// gradient is refused when it is recorded, with the reason: `docs/limits.md` lists it. Every step is kept until ``clear``. All steps of the body in
-/// between have to be the tape's: what other steps do counts as done by hand.
+/// gradient is refused when it is recorded, with the reason: `docs/limits.md` lists it. Every step is kept until ``clear``, or with ``checkpoint_every``
+/// the world every so many steps and the steps since: ``backward`` then takes the others again. All steps of the body in between have to be the
+/// tape's: what other steps do counts as done by hand.
 #[pyclass(frozen, name = "Tape", module = "foible3d")]
 pub struct PyTape {
     world: Py<World>,
-    tape: Mutex<DeformableTape>,
+    /// Shared with a way back that goes on: what it calls may use the tape.
+    tape: Mutex<Arc<DeformableTape>>,
+    has_checkpoints: bool,
     vertices: usize,
 }
 
 impl PyTape {
     /// The tape, while not attached to Python: whoever has it may wait for the world.
-    fn lock_detached(&self) -> MutexGuard<'_, DeformableTape> {
+    fn lock_detached(&self) -> MutexGuard<'_, Arc<DeformableTape>> {
         self.tape.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn lock(&self, py: Python<'_>) -> MutexGuard<'_, DeformableTape> {
+    fn lock(&self, py: Python<'_>) -> MutexGuard<'_, Arc<DeformableTape>> {
         self.tape.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -72,15 +79,28 @@ impl PyTape {
 
 #[pymethods]
 impl PyTape {
-    /// An empty tape of a body of a world.
+    /// An empty tape of a body of a world, which keeps all of its steps, or the world every `checkpoint_every` steps and the steps since.
     #[new]
-    fn new(py: Python<'_>, world: Py<World>, body: PyDeformableHandle) -> PyResult<Self> {
+    #[pyo3(signature = (world, body, checkpoint_every = None))]
+    fn new(
+        py: Python<'_>,
+        world: Py<World>,
+        body: PyDeformableHandle,
+        checkpoint_every: Option<i64>,
+    ) -> PyResult<Self> {
+        let every = checkpoint_every.map(|every| count("checkpoint_every", every)).transpose()?;
+        if every == Some(0) {
+            return Err(bad_value("checkpoint_every is 0, but must be at least 1".into()));
+        }
         let made = world.get().with(py, |inner| {
             let tape = DeformableTape::new(&inner.deformables, body.0).map_err(Failure::from)?;
             Ok::<_, Failure>((tape, inner.deformables.bodies[body.0].vertex_count()))
         })?;
-        let (tape, vertices) = made?;
-        Ok(Self { world, tape: Mutex::new(tape), vertices })
+        let (mut tape, vertices) = made?;
+        if let Some(every) = every {
+            tape = tape.checkpoint_every(every);
+        }
+        Ok(Self { world, tape: Mutex::new(Arc::new(tape)), has_checkpoints: every.is_some(), vertices })
     }
 
     /// Steps the world `n` times and records the steps. A step that has no gradient raises `DeformableBodyError`: the world has taken it.
@@ -89,11 +109,16 @@ impl PyTape {
         in_turns(py, count("n", n)?, |n| {
             let taken = self.world.get().detached(py, |inner| {
                 let mut tape = self.lock_detached();
-                for _ in 0..n {
-                    inner.step_here(1)?;
-                    tape.record(&inner.physics, &inner.deformables).map_err(Failure::from)?;
-                }
-                Ok(())
+                let tape = Arc::make_mut(&mut tape);
+                let Inner { physics, deformables, robots } = inner;
+                here(|| {
+                    (0..n).try_for_each(|_| {
+                        tape.step_by(physics, deformables, |physics, deformables| {
+                            step_with(robots, physics, deformables, &());
+                        })
+                    })
+                })?
+                .map_err(|error| Failure::from(error).into())
             })?;
             taken
         })
@@ -106,7 +131,7 @@ impl PyTape {
 
     /// Forgets the steps.
     fn clear(&self, py: Python<'_>) {
-        self.lock(py).clear();
+        Arc::make_mut(&mut self.lock(py)).clear();
     }
 
     /// Force of a collider on the body in a step [N], an array of shape (3,), in the solver's precision.
@@ -124,7 +149,10 @@ impl PyTape {
     /// The derivatives of a loss, given by its own with respect to what it looks at: `positions` [1/m] and `velocities` [s/m] of the vertices at the
     /// end of steps, dicts of arrays of shape (n, 3) by the number of the step, from the end if negative; `contact_forces` [1/N], a dict of
     /// three numbers by pairs of a step and the handle of a collider; `tensions` [1/N], a dict of numbers by pairs of a step and the handle of a cable.
-    #[pyo3(signature = (positions = None, velocities = None, contact_forces = None, tensions = None))]
+    ///
+    /// Of a tape with checkpoints `control(step, world)` has to do to a copy of the world, before each step but those after a checkpoint, what was
+    /// done to it then; not needed where nothing was.
+    #[pyo3(signature = (positions = None, velocities = None, contact_forces = None, tensions = None, control = None))]
     fn backward(
         &self,
         py: Python<'_>,
@@ -132,7 +160,13 @@ impl PyTape {
         velocities: Option<BTreeMap<isize, Bound<'_, PyAny>>>,
         contact_forces: Option<HashMap<(isize, PyColliderHandle), Triple>>,
         tensions: Option<HashMap<(isize, PyCableHandle), f64>>,
+        control: Option<Py<PyAny>>,
     ) -> PyResult<PyGradient> {
+        if control.is_some() && !self.has_checkpoints {
+            return Err(bad_value(
+                "control is for tapes with checkpoints: this one keeps all of its steps".into(),
+            ));
+        }
         let (positions, velocities) =
             (self.by_step(py, positions, "positions")?, self.by_step(py, velocities, "velocities")?);
         let forces = contact_forces.unwrap_or_default().into_iter();
@@ -143,7 +177,7 @@ impl PyTape {
         let tensions = tensions.collect::<PyResult<Vec<_>>>()?;
         let gradient = py.detach(|| {
             without_panic(|| {
-                let tape = self.lock_detached();
+                let tape = self.lock_detached().clone();
                 let mut loss = tape.loss();
                 for (step, rows) in &positions {
                     each(rows, |vertex, row| loss.add_position(*step, vertex, row))?;
@@ -152,15 +186,53 @@ impl PyTape {
                     each(rows, |vertex, row| loss.add_velocity(*step, vertex, row))?;
                 }
                 for (step, collider, of) in &forces {
-                    loss.add_contact_force(*step, *collider, *of)?;
+                    loss.add_contact_force(*step, *collider, *of).map_err(Failure::from)?;
                 }
                 for (step, cable, of) in &tensions {
-                    loss.add_tension(*step, *cable, *of)?;
+                    loss.add_tension(*step, *cable, *of).map_err(Failure::from)?;
                 }
-                tape.backward(&loss).map_err(Failure::from)
+                if self.has_checkpoints {
+                    return self.replay(&tape, &loss, control.as_ref());
+                }
+                Ok(tape.backward(&loss).map_err(Failure::from)?)
             })
         })?;
         Ok(PyGradient(gradient?))
+    }
+}
+
+impl PyTape {
+    /// The way back from checkpoints; not attached to Python.
+    fn replay(
+        &self,
+        tape: &DeformableTape,
+        loss: &DeformableLoss,
+        control: Option<&Py<PyAny>>,
+    ) -> PyResult<DeformableGradient> {
+        let robots = self.world.get().lock_detached().robots.clone();
+        let copy = Python::attach(|py| {
+            Py::new(py, World::from(Inner { robots: robots.clone(), ..Inner::default() }))
+        })?;
+        let mut failure = None;
+        let redo = |step: usize, physics: &mut PhysicsWorld, deformables: &mut DeformableWorld| {
+            let Some(control) = control.filter(|_| failure.is_none()) else { return };
+            let swap = |physics: &mut PhysicsWorld, deformables: &mut DeformableWorld| {
+                let mut inner = copy.get().lock_detached();
+                std::mem::swap(&mut inner.physics, physics);
+                std::mem::swap(&mut inner.deformables, deformables);
+            };
+            swap(physics, deformables);
+            failure = Python::attach(|py| control.call1(py, (step, copy.clone_ref(py))).err());
+            swap(physics, deformables);
+        };
+        let take = |physics: &mut PhysicsWorld, deformables: &mut DeformableWorld| {
+            step_with(&robots, physics, deformables, &());
+        };
+        let gradient = here(|| tape.replay_by(loss, redo, take))?;
+        match failure {
+            Some(failure) => Err(failure),
+            None => Ok(gradient.map_err(Failure::from)?),
+        }
     }
 }
 

@@ -31,16 +31,20 @@ impl Inner {
 
     /// So many steps, where threads are those of this process.
     pub fn step_here(&mut self, n: usize) -> PyResult<()> {
-        match crate::batch::is_forked() {
-            true => crate::batch::pool(None)?.install(|| self.step(n)),
-            false => self.step(n),
-        }
-        Ok(())
+        here(|| self.step(n))
     }
 }
 
+/// Does what takes threads where they are those of this process.
+pub fn here<R: Send>(work: impl FnOnce() -> R + Send) -> PyResult<R> {
+    Ok(match crate::batch::is_forked() {
+        true => crate::batch::pool(None)?.install(work),
+        false => work(),
+    })
+}
+
 /// One step with the hooks of all robots.
-fn step_with(
+pub fn step_with(
     robots: &[Arc<Robot>],
     physics: &mut PhysicsWorld,
     deformables: &mut DeformableWorld,

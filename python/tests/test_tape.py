@@ -8,7 +8,7 @@ import foible3d as f
 STEPS = 20
 
 
-def swing(modulus=1e5, density=1000.0, push=0.5, pressure=None, friction=0.0, floor=None, start=0.0):
+def swing(modulus=1e5, density=1000.0, push=0.5, pressure=None, friction=0.0, floor=None, start=0.0, every=None):
     """A bar that is held at one end, or lies on a floor; with the tape of it."""
     world = f.World()
     material = f.Material(modulus, 0.3, density=density, mass_damping=1.0, friction=0.0)
@@ -29,7 +29,7 @@ def swing(modulus=1e5, density=1000.0, push=0.5, pressure=None, friction=0.0, fl
     velocities[tip, 1] += start
     body.velocities = velocities
     body.add_force((0, 0, push), [tip])
-    tape = f.Tape(world, handle)
+    tape = f.Tape(world, handle, checkpoint_every=every)
     return world, body, tape, tip, collider
 
 
@@ -113,3 +113,42 @@ def test_what_has_no_gradient_is_refused():
     other = f.World()
     with pytest.raises(f.InvalidHandle):
         f.Tape(other, body.handle)
+
+
+def test_checkpoints_replay_to_the_same_numbers():
+    def push(step, world):
+        ((_, body),) = world.deformable_bodies
+        body.reset_forces()
+        body.add_force((0, 0, 0.05 * step), [int(body.positions[:, 0].argmax())])
+
+    gradients = []
+    for every in [None, 1, 7, 100]:
+        world, body, tape, tip, _ = swing(push=0.0, every=every)
+        for step in range(STEPS):
+            push(step, world)
+            tape.step()
+        of_positions = np.zeros((body.vertex_count, 3))
+        of_positions[tip, 2] = 1.0
+        control = {} if every is None else {"control": push}
+        gradients.append(tape.backward(positions={-1: of_positions, 4: of_positions}, **control))
+        assert len(tape) == STEPS
+        if every is None:
+            with pytest.raises(f.DeformableBodyError, match="control"):
+                tape.backward(control=push)
+        elif every == 7:
+            # Nothing done, or not the same, is found out; an error of the user's comes back; the tape may be used meanwhile.
+            for bad in [None, lambda step, world: push(step - 1, world), lambda step, world: world.step()]:
+                with pytest.raises(f.DeformableBodyError, match="leads elsewhere"):
+                    tape.backward(control=bad)
+            with pytest.raises(ZeroDivisionError):
+                tape.backward(control=lambda step, world: 1 / 0)
+            lengths = []
+            tape.backward(control=lambda step, world: (push(step, world), lengths.append(len(tape))))
+            assert lengths == [STEPS] * (STEPS - 3)
+    first, *others = gradients
+    for other in others:
+        for name in ["initial_positions", "initial_velocities", "forces", "pin_targets", "gravity"]:
+            assert np.array_equal(getattr(first, name), getattr(other, name)), name
+        assert all(np.array_equal(value, other.materials[name]) for name, value in first.materials.items())
+    with pytest.raises(f.DeformableBodyError, match="at least 1"):
+        swing(every=0)

@@ -1,18 +1,27 @@
 //! Worlds as they were before a step, to go on from: what a tape keeps in the place of every step.
 
+use crate::math::Vec3;
 use crate::pipeline::DeformableWorld;
 use rapier3d::pipeline::PhysicsWorld;
 
 /// Both worlds before a step.
 pub(super) struct Checkpoint {
     pub step: usize,
+    /// Where the step before it has left the body; empty of the first.
+    pub led_to: Vec<Vec3>,
     physics: PhysicsWorld,
     deformables: DeformableWorld,
 }
 
 impl Checkpoint {
-    pub fn new(step: usize, physics: &PhysicsWorld, deformables: &DeformableWorld) -> Self {
-        Self { step, physics: copied(physics), deformables: deformables.clone() }
+    pub fn new(
+        step: usize,
+        led_to: &[Vec3],
+        physics: &PhysicsWorld,
+        deformables: &DeformableWorld,
+    ) -> Self {
+        let led_to = led_to.to_vec();
+        Self { step, led_to, physics: copied(physics), deformables: deformables.clone() }
     }
 
     /// The worlds, to be stepped.
@@ -23,7 +32,7 @@ impl Checkpoint {
 
 impl Clone for Checkpoint {
     fn clone(&self) -> Self {
-        Self::new(self.step, &self.physics, &self.deformables)
+        Self::new(self.step, &self.led_to, &self.physics, &self.deformables)
     }
 }
 

@@ -17,6 +17,9 @@ use rapier3d::pipeline::PhysicsWorld;
 use std::fmt;
 use std::sync::Arc;
 
+/// Mean edges by which a replay may end elsewhere: the same steps have the same bits, other ones are off by their motion.
+const ELSEWHERE: f64 = 1.0e-9;
+
 /// Steps of one body, recorded so that derivatives of a loss with respect to what the body is made of, how it began and what acted on it
 /// can be had: exact ones of the converged steps, for one solve a step. What its user changes between steps (forces, pins,
 /// activation, impulses, what draws cables) takes part; what moves or speeds vertices up counts as added to what was there.
@@ -117,14 +120,39 @@ impl DeformableTape {
         physics: &mut PhysicsWorld,
         deformables: &mut DeformableWorld,
     ) -> Result<(), DeformableBodyError> {
+        self.step_by(physics, deformables, |physics, deformables| deformables.step(physics))
+    }
+
+    /// As [`DeformableTape::step`], where `take` steps the worlds once, with hooks or events
+    /// ([`DeformableWorld::step_with_events`]).
+    ///
+    /// # Errors
+    /// As [`DeformableTape::record`]; the world has been stepped nonetheless.
+    pub fn step_by(
+        &mut self,
+        physics: &mut PhysicsWorld,
+        deformables: &mut DeformableWorld,
+        take: impl FnOnce(&mut PhysicsWorld, &mut DeformableWorld),
+    ) -> Result<(), DeformableBodyError> {
         if self.checkpoint_every.is_some_and(|every| self.len().is_multiple_of(every)) {
-            self.forgotten = self.len();
+            let step = self.len();
+            let checkpoint = Checkpoint::new(step, self.led_to(step), physics, deformables);
+            self.forgotten = step;
             self.steps.clear();
-            self.checkpoints.push(Checkpoint::new(self.forgotten, physics, deformables));
+            self.checkpoints.push(checkpoint);
         }
         let gravity = from_real(physics.gravity);
-        deformables.step(physics);
+        take(physics, deformables);
         self.add(physics, deformables, gravity)
+    }
+
+    /// Where the step before one has left the body: of steps that are kept, or that a checkpoint comes after.
+    fn led_to(&self, step: usize) -> &[Vec3] {
+        let kept = step.checked_sub(self.forgotten + 1).and_then(|place| self.steps.get(place));
+        let checkpoint = || self.checkpoints.iter().find(|checkpoint| checkpoint.step == step);
+        kept.map(|record| &record.x_end[..])
+            .or_else(|| checkpoint().map(|checkpoint| &checkpoint.led_to[..]))
+            .unwrap_or_default()
     }
 
     /// Records the step that the world has just taken, before anything is changed: where several bodies have a tape each.
@@ -215,11 +243,24 @@ impl DeformableTape {
     /// `control` has to do before each step, of which it is told the number, what was done then.
     ///
     /// # Errors
-    /// As [`DeformableTape::backward`].
+    /// As [`DeformableTape::backward`], and if the steps lead elsewhere than they did.
     pub fn replay(
         &self,
         loss: &DeformableLoss,
+        control: impl FnMut(usize, &mut PhysicsWorld, &mut DeformableWorld),
+    ) -> Result<DeformableGradient, DeformableBodyError> {
+        self.replay_by(loss, control, |physics, deformables| deformables.step(physics))
+    }
+
+    /// As [`DeformableTape::replay`], of steps that `take` takes ([`DeformableTape::step_by`]).
+    ///
+    /// # Errors
+    /// As [`DeformableTape::replay`].
+    pub fn replay_by(
+        &self,
+        loss: &DeformableLoss,
         mut control: impl FnMut(usize, &mut PhysicsWorld, &mut DeformableWorld),
+        mut take: impl FnMut(&mut PhysicsWorld, &mut DeformableWorld),
     ) -> Result<DeformableGradient, DeformableBodyError> {
         let mut gradient = self.begin(loss)?;
         let mut back = self.back()?;
@@ -232,12 +273,24 @@ impl DeformableTape {
                 if step > checkpoint.step {
                     control(step, &mut physics, &mut deformables);
                 }
-                part.step(&mut physics, &mut deformables)?;
+                part.step_by(&mut physics, &mut deformables, &mut take)?;
             }
+            self.check_replay(end, part.led_to(part.len()))?;
             part.go_back(checkpoint.step, loss, &mut back, &mut gradient)?;
             end = checkpoint.step;
         }
         Ok(self.finish(&back, gradient))
+    }
+
+    /// Whether a replay has led where the steps before one did.
+    fn check_replay(&self, end: usize, led_to: &[Vec3]) -> Result<(), BodyError> {
+        let far = ELSEWHERE * self.model.surface.mean_edge;
+        let is_there = |(a, b): (&Vec3, &Vec3)| (a - b).amax() <= far;
+        if !self.led_to(end).iter().zip(led_to).all(is_there) {
+            let what = "replayed, it leads elsewhere: `control` does not do what was done before the steps";
+            return Err(BodyError::NoGradient { step: end - 1, what });
+        }
+        Ok(())
     }
 
     fn begin(&self, loss: &DeformableLoss) -> Result<DeformableGradient, BodyError> {
