@@ -14,12 +14,7 @@ pub(super) struct Checkpoint {
 }
 
 impl Checkpoint {
-    pub fn new(
-        step: usize,
-        led_to: &[Vec3],
-        physics: &PhysicsWorld,
-        deformables: &DeformableWorld,
-    ) -> Self {
+    pub fn new(step: usize, led_to: &[Vec3], physics: &PhysicsWorld, deformables: &DeformableWorld) -> Self {
         let led_to = led_to.to_vec();
         Self { step, led_to, physics: copied(physics), deformables: deformables.clone() }
     }
