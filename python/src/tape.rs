@@ -314,6 +314,7 @@ impl PyGradient {
         found.set_item("poisson_ratio", self.by_region(py, |m| m.poisson_ratio))?;
         found.set_item("density", self.by_region(py, |m| m.density))?;
         found.set_item("mass_damping", self.by_region(py, |m| m.mass_damping))?;
+        found.set_item("stiffness_damping", self.by_region(py, |m| m.stiffness_damping))?;
         found.set_item("fibre_modulus", self.by_region(py, |m| m.fibre_modulus))?;
         Ok(found)
     }

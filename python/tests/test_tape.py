@@ -8,10 +8,10 @@ import foible3d as f
 STEPS = 20
 
 
-def swing(modulus=1e5, density=1000.0, push=0.5, pressure=None, friction=0.0, floor=None, start=0.0, every=None):
+def swing(modulus=1e5, beta=0.0, density=1000.0, push=0.5, pressure=None, friction=0.0, floor=None, start=0.0, every=None):
     """A bar that is held at one end, or lies on a floor; with the tape of it."""
     world = f.World()
-    material = f.Material(modulus, 0.3, density=density, mass_damping=1.0, friction=0.0)
+    material = f.Material(modulus, 0.3, density=density, mass_damping=1.0, stiffness_damping=beta, friction=0.0)
     options = dict(material=material, fidelity=f.Fidelity.REFERENCE, can_sleep=False, tolerance=1e-12, contact_tolerance=1e-12)
     handle = world.add_deformable(f.DeformableBody.cuboid((0.25, 0.0625, 0.0625), (4, 1, 1), max_iterations=400, **options))
     body = world.deformable_bodies[handle]
@@ -113,6 +113,20 @@ def test_what_has_no_gradient_is_refused():
     other = f.World()
     with pytest.raises(f.InvalidHandle):
         f.Tape(other, body.handle)
+
+
+def test_stiffness_damping_has_a_gradient():
+    def loss(beta):
+        _, body, tape, tip, _ = swing(beta=beta)
+        tape.step(STEPS)
+        return body.positions[tip, 2], body, tape, tip
+
+    _, body, tape, tip = loss(0.01)
+    of_positions = np.zeros((body.vertex_count, 3))
+    of_positions[tip, 2] = 1.0
+    (found,) = tape.backward(positions={-1: of_positions}).materials["stiffness_damping"]
+    slope = (loss(0.01 + 1e-5)[0] - loss(0.01 - 1e-5)[0]) / 2e-5
+    assert found == pytest.approx(slope, rel=1e-4) and found != 0.0
 
 
 def test_checkpoints_replay_to_the_same_numbers():

@@ -13,7 +13,7 @@ use super::record::{ContactRecord, StepRecord};
 use super::spin::{Cotangents, through_spin};
 use super::tangent::Tangent;
 use crate::body::DeformableCableHandle;
-use crate::fem::DeformableModel;
+use crate::fem::{DeformableModel, Elements, StiffnessDamping, add_damping_by_start};
 use crate::math::Vec3;
 
 /// What goes backward over the steps.
@@ -74,12 +74,18 @@ impl<'a> Backward<'a> {
         let g: Vec<Vec3> = of.x_end.iter().zip(&of.v_end).map(|(x, v)| x + v / h).collect();
         of.x_start.iter_mut().zip(&of.v_end).for_each(|(x, v)| *x -= v / h);
         let of_forces = self.of_forces(record, seed)?;
-        let Solved { z, of_pins, cables } = self.solve(record, &inertia, &of_forces, g, &mut of)?;
+        let mut damping = record.damping(model);
+        let Solved { z, of_pins, cables } =
+            self.solve(record, (&inertia, &damping), &of_forces, g, &mut of)?;
         let between = record.cables.iter().zip(&cables).map(|(cable, of)| (cable.handle, of.before));
         self.cables = between.collect();
         out.friction += of.friction;
         add_inertia(record, &inertia, &z, &mut of);
-        let mut work = ElasticWork { model, record, z: &z, force: &mut self.force };
+        if damping.resists() {
+            let elements = Elements { model, materials: &record.materials, activations: &record.activations };
+            add_damping_by_start(&elements, &damping, [&record.x_end, &record.x_start], &z, &mut of.x_start);
+        }
+        let mut work = ElasticWork { model, record, z: &z, damping: &mut damping, force: &mut self.force };
         work.add_materials(&mut out.materials);
         work.add_twists(&mut out.materials);
         let activation = work.activation();
@@ -103,7 +109,7 @@ impl<'a> Backward<'a> {
     fn solve(
         &mut self,
         record: &StepRecord,
-        inertia: &Inertia,
+        (inertia, damping): (&Inertia, &StiffnessDamping),
         of_forces: &OfForces<'_>,
         mut g: Vec<Vec3>,
         of: &mut Cotangents,
@@ -117,7 +123,7 @@ impl<'a> Backward<'a> {
             is_free[node as usize] = false;
             of_fixed[node as usize] = std::mem::take(&mut g[node as usize]);
         }
-        if !self.tangent.update(self.model, record, &fixed) {
+        if !self.tangent.update(self.model, record, damping, &fixed) {
             return Err("its stiffness has no inverse");
         }
         let mut z_stuck = vec![Vec3::zeros(); g.len()];

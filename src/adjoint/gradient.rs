@@ -14,6 +14,8 @@ pub struct MaterialGradient {
     pub density: f64,
     /// Per 1/s of mass damping α.
     pub mass_damping: f64,
+    /// Per second of stiffness damping β; zero where there is none.
+    pub stiffness_damping: f64,
     /// Per pascal of the fibres' modulus.
     pub fibre_modulus: f64,
 }
@@ -78,6 +80,7 @@ impl DeformableGradient {
             poisson_ratio: sum.poisson_ratio + m.poisson_ratio,
             density: sum.density + m.density,
             mass_damping: sum.mass_damping + m.mass_damping,
+            stiffness_damping: sum.stiffness_damping + m.stiffness_damping,
             fibre_modulus: sum.fibre_modulus + m.fibre_modulus,
         })
     }

@@ -26,6 +26,8 @@ pub(super) struct ElasticWork<'a> {
     pub model: &'a DeformableModel,
     pub record: &'a StepRecord,
     pub z: &'a [Vec3],
+    /// The stiffness damping of the step.
+    pub damping: &'a mut StiffnessDamping,
     pub force: &'a mut Vec<Vec3>,
 }
 
@@ -34,9 +36,12 @@ impl ElasticWork<'_> {
         self.force.clear();
         self.force.resize(self.z.len(), Vec3::zeros());
         let elements = Elements { model: self.model, materials, activations };
-        let (damping, frame) = (StiffnessDamping::default(), Mat3::identity());
+        if self.damping.resists() {
+            self.damping.with_materials(materials, self.record.h);
+        }
+        let (damping, frame) = (&*self.damping, Mat3::identity());
         let x = &self.record.x_end;
-        let at = Evaluation { damping: &damping, x, frame: &frame, limit: f64::INFINITY };
+        let at = Evaluation { damping, x, frame: &frame, limit: f64::INFINITY };
         add_forces(&elements, &at, self.force);
         dot(self.force, self.z)
     }
@@ -79,6 +84,11 @@ impl ElasticWork<'_> {
             // Below nought smoothed elements have no volume to keep.
             let scheme = if poisson_ratio > apart { LINEAR } else { FORWARD };
             out.poisson_ratio += self.along(region, apart, scheme, |m, d| m.poisson_ratio += d);
+            let beta = self.record.materials[region].stiffness_damping;
+            if beta != 0.0 {
+                out.stiffness_damping +=
+                    self.along(region, 0.5 * beta, LINEAR, |m, d| m.stiffness_damping += d);
+            }
             if self.model.has_fibres() {
                 out.fibre_modulus += self.along(region, by, LINEAR, |m, d| m.fibre_modulus += d);
             }

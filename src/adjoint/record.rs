@@ -5,6 +5,7 @@ use super::held_twists::TwistRecord;
 use crate::body::{ConstraintKey, DeformableBody, HeldTwist, Integrator, Solver};
 use crate::contact::{Endpoint, Law};
 use crate::energy::CavityFilling;
+use crate::fem::{DeformableModel, Elements, StiffnessDamping};
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
 use crate::pipeline::{SolvedBody, SolvedContact};
@@ -112,6 +113,16 @@ impl StepRecord {
     }
 }
 
+impl StepRecord {
+    /// The stiffness damping of the step.
+    pub fn damping(&self, model: &DeformableModel) -> StiffnessDamping {
+        let mut damping = StiffnessDamping::default();
+        let elements = Elements { model, materials: &self.materials, activations: &self.activations };
+        damping.begin(&elements, self.h, &self.x_start, None);
+        damping
+    }
+}
+
 /// Whether a constraint other than one of a cable has a force.
 fn carries(contact: &&SolvedContact<'_>) -> bool {
     contact.force != Vec3::zeros() && !matches!(contact.constraint.key, ConstraintKey::Cable(_))
@@ -122,13 +133,16 @@ fn twist_record(held: &HeldTwist) -> TwistRecord {
 }
 
 fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
-    let resists = |m: &DeformableMaterial| m.stiffness_damping != 0.0 || m.branch_count() > 0;
+    let model = body.model();
+    let is_damped = body.materials.iter().any(|m| m.stiffness_damping != 0.0);
+    let is_thin = !(model.triangles.is_empty() && model.stencils.is_empty());
     let why = [
         (body.is_sleeping(), "the body sleeps: it has to be without `can_sleep`"),
         (body.body_type() != RigidBodyType::Dynamic, "the body is not dynamic"),
         (body.settings().integrator != Integrator::ImplicitEuler, "only implicit Euler has one"),
         (body.settings().solver == Solver::Xpbd, "position-based dynamics does not end at a minimum"),
-        (body.materials.iter().any(resists), "stiffness damping and Maxwell branches have none"),
+        (body.materials.iter().any(|m| m.branch_count() > 0), "Maxwell branches have none"),
+        (is_damped && is_thin, "stiffness damping of sheets, rods, springs and fibres has none"),
         (body.materials.iter().any(|m| m.orthotropic.is_some()), "woven sheets have none"),
         (body.wind().is_some(), "wind has none"),
     ];

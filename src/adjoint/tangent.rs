@@ -4,7 +4,7 @@
 use super::directions::Directions;
 use super::filled_rooms::{FilledRoom, filled_rooms};
 use super::record::StepRecord;
-use crate::fem::{DeformableModel, Elements, SystemMatrix};
+use crate::fem::{DeformableModel, Elements, StiffnessDamping, SystemMatrix, add_damping_tangents};
 use crate::math::{Mat3, Vec3};
 use crate::solver::linear::{
     Factor, FactorScratch, MatrixValues, Symbolic, TangentPlace, assemble_tangent, assemble_tangent_beside,
@@ -38,7 +38,13 @@ impl Tangent {
     }
 
     /// Makes it of a step where that has ended, with these nodes held; false if that cannot be.
-    pub fn update(&mut self, model: &DeformableModel, record: &StepRecord, pins: &[u32]) -> bool {
+    pub fn update(
+        &mut self,
+        model: &DeformableModel,
+        record: &StepRecord,
+        damping: &StiffnessDamping,
+        pins: &[u32],
+    ) -> bool {
         let StepRecord { h, x_end: x, materials, activations, twists, .. } = record;
         let (h, elements) = (*h, Elements { model, materials, activations });
         self.beside.clear();
@@ -50,13 +56,20 @@ impl Tangent {
         let across = record.cables.iter().flat_map(|cable| cable.across(x.len()));
         self.directions.set(of_rooms.chain(of_twists).chain(across));
         let (symbolic, beside, rooms) = (&self.symbolic, &mut self.beside, &self.rooms);
+        let mut sides = Vec::new();
         let others = |add: &mut dyn FnMut(usize, usize, &Mat3)| {
+            if damping.resists() {
+                add_damping_tangents(&elements, damping, x, &mut sides, &mut *add);
+            }
             rooms.iter().for_each(|room| room.add_pressed(model, x, add));
             twists.iter().for_each(|twist| twist.add_twisted(model, materials, x, add));
         };
         let place = TangentPlace { x, projected: false, pins, h };
         let mut matrix = MatrixValues::default();
-        assemble_tangent_beside(&elements, &place, (symbolic, &mut matrix), others, |i, j, block| {
+        // Of damping there is all of it, not its leading part.
+        let undamped: Vec<_> = materials.iter().map(|material| material.stiffness_damping(0.0)).collect();
+        let bare = Elements { materials: &undamped, ..elements };
+        assemble_tangent_beside(&bare, &place, (symbolic, &mut matrix), others, |i, j, block| {
             beside.push((i, j, *block));
         });
         self.values = None;
@@ -207,7 +220,7 @@ mod tests {
             let x: Vec<Vec3> = model.rest.iter().map(|X| Vec3::new(X.x * squeeze, X.y, X.z)).collect();
             let mut tangent = Tangent::new(&model).unwrap();
             let record = StepRecord::still(&x, &elements, 1.0);
-            assert!(tangent.update(&model, &record, &pins));
+            assert!(tangent.update(&model, &record, &StiffnessDamping::default(), &pins));
             assert_eq!(tangent.values.is_none(), is_definite);
             let symbolic = &tangent.symbolic;
             let mut matrix = MatrixValues::default();

@@ -34,9 +34,12 @@ mod hard_limits;
 pub(crate) mod constant_matrix;
 mod tangents;
 
+mod damped_tangents;
+
 pub use cavities::DeformableCavity;
 pub(crate) use compliant::ElementMultipliers;
 pub use constant_matrix::SystemMatrix;
+pub(crate) use damped_tangents::{add_damping_by_start, add_damping_tangents};
 pub(crate) use frames::{floating_frame, node_rotations, volume};
 pub(crate) use hard_limits::{HardLimiting, Holds, Room, is_beyond_hard_limits};
 pub use model::DeformableModel;

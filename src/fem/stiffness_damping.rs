@@ -66,6 +66,17 @@ impl StiffnessDamping {
         }
     }
 
+    /// Takes other materials, without branches, in the same step of `h` \[s\].
+    pub fn with_materials(&mut self, materials: &[DeformableMaterial], h: f64) {
+        self.ratios.clear();
+        self.ratios.extend(materials.iter().map(|material| material.stiffness_damping / h));
+    }
+
+    /// Whether anything resists.
+    pub fn resists(&self) -> bool {
+        self.ratios.iter().any(|ratio| *ratio != 0.0)
+    }
+
     /// Lets the dampers give way over a step of `h` \[s\] that has ended at `x`, in those of the body.
     pub fn end(&mut self, elements: &Elements<'_>, h: f64, x: &[Vec3], dampers: &mut Dampers) {
         dampers.clone_from(&self.dampers);

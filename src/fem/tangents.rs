@@ -55,7 +55,12 @@ pub(crate) fn add_tangents(
 }
 
 /// The blocks `Σ_k w_k u_k,a u_k,bᵀ` of an element with the modes' sides u, mode by mode.
-fn add_products(nodes: &[u32], weights: &[f64], sides: &[Vec3], add: &mut impl FnMut(usize, usize, &Mat3)) {
+pub(super) fn add_products(
+    nodes: &[u32],
+    weights: &[f64],
+    sides: &[Vec3],
+    add: &mut impl FnMut(usize, usize, &Mat3),
+) {
     for (a, &i) in nodes.iter().enumerate() {
         for (b, &j) in nodes.iter().enumerate().filter(|(_, j)| **j <= i) {
             let mut block = Mat3::zeros();

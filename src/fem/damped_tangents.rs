@@ -1,0 +1,144 @@
+//! Second derivatives of stiffness damping, of solids: what gradients over steps need of it.
+//!
+//! With the stretch S at the start of the step the density is, per β/h, `μ(‖F‖² + ‖S‖²) − 2μ N(FS) + λ/2 (N(F) − tr S)²`, with the
+//! sum N of the (signed) principal stretches: that of F and that of FS are isotropic, and have the modes of such energies
+//! [Smith et al. 2019].
+
+use super::model::Elements;
+use super::solid_elements::{Law, SolidElement};
+use super::stiffness_damping::StiffnessDamping;
+use super::tangents::add_products;
+use crate::energy::{Mode, Principal, modes};
+use crate::math::polar::signed_svd;
+use crate::math::{Mat3, Vec3};
+
+/// A solid element that is damped.
+struct Damped<'a> {
+    element: &'a SolidElement<'a>,
+    mu: f64,
+    lambda: f64,
+    /// Its volume, times β/h and what branches add \[m³\].
+    weight: f64,
+    stretch: Mat3,
+    F: Mat3,
+}
+
+/// Sum of a principal stretch over another, of inverted elements, below which they count as cancelled.
+const CANCELLED: f64 = 1.0e-9;
+
+/// Calls `add(i, j, K)` with the blocks `K = −∂fᵢ/∂xⱼ` [N/m], i ≥ j, of damping at positions `x`. `sides` is memory.
+pub(crate) fn add_damping_tangents(
+    elements: &Elements<'_>,
+    damping: &StiffnessDamping,
+    x: &[Vec3],
+    sides: &mut Vec<Vec3>,
+    mut add: impl FnMut(usize, usize, &Mat3),
+) {
+    for_each_damped(elements, damping, x, |damped| {
+        let SolidElement { nodes, gradients, .. } = *damped.element;
+        let mut add_modes = |modes: &[Mode; 9], before: &Mat3| {
+            sides.clear();
+            sides.extend(modes.iter().flat_map(|m| gradients.iter().map(move |g| m.shape * (before * g))));
+            add_products(nodes, &modes.map(|m| m.stiffness * damped.weight), sides, &mut add);
+        };
+        add_modes(&damped.modes_of_gradient(), &Mat3::identity());
+        add_modes(&damped.modes_of_stretched(), &damped.stretch);
+    });
+}
+
+/// Adds to `of_start` what positions at the start of the step change of the virtual work of its damping along `z`, `z·∂f/∂xₙ`.
+pub(crate) fn add_damping_by_start(
+    elements: &Elements<'_>,
+    damping: &StiffnessDamping,
+    [x, x_start]: [&[Vec3]; 2],
+    z: &[Vec3],
+    of_start: &mut [Vec3],
+) {
+    for_each_damped(elements, damping, x, |damped| {
+        let SolidElement { nodes, gradients, .. } = *damped.element;
+        let of_stretch = damped.work_by_stretch(&gradient_of(damped.element, z));
+        let F_start = gradient_of(damped.element, x_start);
+        let of_gradient = F_start * by_square(&damped.stretch, &of_stretch) * 2.0;
+        nodes.iter().zip(gradients).for_each(|(n, g)| of_start[*n as usize] += of_gradient * g);
+    });
+}
+
+/// `Σ_a x_a g_aᵀ`.
+fn gradient_of(element: &SolidElement<'_>, x: &[Vec3]) -> Mat3 {
+    let pairs = element.nodes.iter().zip(element.gradients);
+    pairs.fold(Mat3::zeros(), |F, (&n, g)| F + x[n as usize] * g.transpose())
+}
+
+fn for_each_damped(
+    elements: &Elements<'_>,
+    damping: &StiffnessDamping,
+    x: &[Vec3],
+    mut with: impl FnMut(&Damped<'_>),
+) {
+    let stretches = &damping.stretches;
+    elements.model.for_each_energy(elements.materials, |law, element| {
+        let Law { lame, region, is_patch, .. } = *law;
+        let blocks = if is_patch { &stretches.patches } else { &stretches.solid };
+        let (Some(ratio), Some(block)) = (damping.ratios.get(region), blocks.get(element.place[0])) else {
+            return;
+        };
+        with(&Damped {
+            element,
+            mu: lame.mu,
+            lambda: lame.lambda,
+            weight: element.volume * ratio,
+            stretch: block.lane(element.place[1]),
+            F: gradient_of(element, x),
+        });
+    });
+}
+
+impl Damped<'_> {
+    /// The Hessian over F of `μ‖F‖² + λ/2 (N(F) − tr S)²`.
+    fn modes_of_gradient(&self) -> [Mode; 9] {
+        let (mu, lambda, trace) = (self.mu, self.lambda, self.stretch.trace());
+        modes(&self.F, |sigma| Principal {
+            density: 0.0,
+            gradient: sigma * (2.0 * mu) + Vec3::repeat(lambda * (sigma.sum() - trace)),
+            hessian: Mat3::from_diagonal_element(2.0 * mu) + Mat3::repeat(lambda),
+        })
+    }
+
+    /// The Hessian over FS of `−2μ N(FS)`.
+    fn modes_of_stretched(&self) -> [Mode; 9] {
+        self.modes_of_sum(-2.0 * self.mu)
+    }
+
+    /// The Hessian over FS of `N(FS)` times a factor.
+    fn modes_of_sum(&self, factor: f64) -> [Mode; 9] {
+        let gradient = Vec3::repeat(factor);
+        modes(&(self.F * self.stretch), |_| Principal { density: 0.0, gradient, hessian: Mat3::zeros() })
+    }
+
+    /// What the (symmetric) stretch S changes of the virtual work of damping forces, `−∂²E/∂S∂F : dF`.
+    fn work_by_stretch(&self, dF: &Mat3) -> Mat3 {
+        let (U, _, V) = signed_svd(&(self.F * self.stretch));
+        let turned = U * V.transpose();
+        let moved = dF * self.stretch;
+        let modes = self.modes_of_sum(1.0);
+        let turning =
+            modes.iter().fold(Mat3::zeros(), |sum, m| sum + m.shape * (m.stiffness * m.shape.dot(&moved)));
+        let shape = dF.tr_mul(&turned) + self.F.tr_mul(&turning);
+        let (U, _, V) = signed_svd(&self.F);
+        let volume = self.lambda * (U * V.transpose()).dot(dF);
+        ((shape + shape.transpose()) * self.mu + Mat3::from_diagonal_element(volume)) * self.weight
+    }
+}
+
+/// X, symmetric, with `S X + X S = B`: what FᵀF = S² changes of what S changes by B.
+fn by_square(S: &Mat3, B: &Mat3) -> Mat3 {
+    let eigen = S.symmetric_eigen();
+    let (V, s) = (eigen.eigenvectors, eigen.eigenvalues);
+    let within = V.tr_mul(&(B * V));
+    let size = s.amax();
+    let scaled = Mat3::from_fn(|i, j| {
+        let sum = s[i] + s[j];
+        if sum.abs() > CANCELLED * size { within[(i, j)] / sum } else { 0.0 }
+    });
+    V * scaled * V.transpose()
+}
