@@ -176,6 +176,16 @@ fn a_box_on_a_cube_by_newtons_method_allocates_nothing() {
     assert_eq!(on_one_thread(|| allocations(vec![cube], &[Vector::Y * 0.5], 180, 40)), 0);
 }
 
+/// Each of two bodies of one island gets its own memory again.
+#[test]
+fn a_cube_on_another_by_newtons_method_allocates_nothing() {
+    let upper = DeformableBodyBuilder::cuboid(Vector::splat(0.2), [3; 3])
+        .can_sleep(false)
+        .translation(Vector::new(0.02, 0.6, 0.01));
+    let cubes = vec![newton(cube(1e6, Vector::Y * 0.2)), newton(upper)];
+    assert_eq!(on_one_thread(|| allocations(cubes, &[], 180, 40)), 0);
+}
+
 /// Of more than 256 vertices: Newton's method, while it hangs.
 #[test]
 fn a_hanging_flag_allocates_nothing() {

@@ -65,8 +65,26 @@ fn one_region_may_be_damped_more_than_another() {
     let mut scene = Scene::new(DeformableBodyBuilder::model(Arc::new(painted)).pinned(|x| x.x < -0.249));
     scene.regions = vec![(1, 5.0e4)];
     let first = Parameter { of: |g, _| g.materials[0].youngs_modulus, ..MATERIAL[0] };
-    let others = MATERIAL.iter().skip(1).chain(&LOADS).chain([&PINS, &first, &DAMPING]);
-    let error = state_error(&scene, &Run::of(damped()), others);
+    let damping = Parameter { of: |g, _| g.materials[0].stiffness_damping, ..DAMPING };
+    for (ours, other) in [(BETA, 0.0), (BETA, 3.0 * BETA)] {
+        println!("{ours} and {other} s");
+        scene.beta = Some(other);
+        let others = MATERIAL.iter().skip(1).chain(&LOADS).chain([&PINS, &first, &damping]);
+        let error = state_error(&scene, &Run::of(damped().stiffness_damping(ours)), others);
+        assert!(error < EXACT, "{error:e}");
+    }
+}
+
+/// What is thin and not damped is no hindrance.
+#[test]
+fn a_damped_block_may_have_a_skin_without_damping() {
+    let mesh = TetMesh::cuboid([0.25, 0.0625, 0.0625], [4, 1, 1]).unwrap();
+    let skin = [[0, 1, 5]];
+    let skinned = Structure::solid(&mesh).with_sheet(&skin, 0.001).unwrap();
+    let model = DeformableModel::from_structure(&skinned).unwrap().painted(|[x, ..]| u32::from(x < -0.1));
+    let mut scene = Scene::new(DeformableBodyBuilder::model(Arc::new(model)).pinned(|x| x.x < -0.249));
+    (scene.regions, scene.beta) = (vec![(1, 1.0e5)], Some(0.0));
+    let error = state_error(&scene, &Run::of(damped()), LOADS.iter().chain([&PINS]));
     assert!(error < EXACT, "{error:e}");
 }
 

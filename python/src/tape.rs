@@ -134,7 +134,7 @@ impl PyTape {
         Arc::make_mut(&mut self.lock(py)).clear();
     }
 
-    /// Force of a collider on the body in a step [N], an array of shape (3,), in the solver's precision.
+    /// Force of a collider on the body in a step [N], an array of shape (3,), in the solver's precision; with checkpoints of steps since the last one.
     fn contact_force<'py>(
         &self,
         py: Python<'py>,
@@ -142,7 +142,15 @@ impl PyTape {
         collider: PyColliderHandle,
     ) -> PyResult<Array1<'py>> {
         let place = self.place(py, step)?;
-        let force = self.lock(py).contact_force(place, collider.0);
+        let (kept, force) = {
+            let tape = self.lock(py);
+            (tape.first_kept(), tape.contact_force(place, collider.0))
+        };
+        if place < kept {
+            return Err(bad_value(format!(
+                "step {place} is not kept: with checkpoints the tape has the steps from {kept} on"
+            )));
+        }
         Ok(triple(py, force))
     }
 
@@ -213,23 +221,30 @@ impl PyTape {
         let copy = Python::attach(|py| {
             Py::new(py, World::from(Inner { robots: robots.clone(), ..Inner::default() }))
         })?;
-        let mut failure = None;
+        let failure = Mutex::new(None);
+        let fails = || failure.lock().unwrap_or_else(PoisonError::into_inner);
         let redo = |step: usize, physics: &mut PhysicsWorld, deformables: &mut DeformableWorld| {
-            let Some(control) = control.filter(|_| failure.is_none()) else { return };
+            let Some(control) = control.filter(|_| fails().is_none()) else { return };
             let swap = |physics: &mut PhysicsWorld, deformables: &mut DeformableWorld| {
                 let mut inner = copy.get().lock_detached();
                 std::mem::swap(&mut inner.physics, physics);
                 std::mem::swap(&mut inner.deformables, deformables);
             };
             swap(physics, deformables);
-            failure = Python::attach(|py| control.call1(py, (step, copy.clone_ref(py))).err());
+            let failed = Python::attach(|py| control.call1(py, (step, copy.clone_ref(py))).err());
+            *fails() = failed;
             swap(physics, deformables);
         };
         let take = |physics: &mut PhysicsWorld, deformables: &mut DeformableWorld| {
-            step_with(&robots, physics, deformables, &());
+            // Ctrl-C is heard between steps. Without a step the way back ends.
+            let failed = &mut *fails();
+            *failed = failed.take().or_else(|| Python::attach(|py| py.check_signals().err()));
+            if failed.is_none() {
+                step_with(&robots, physics, deformables, &());
+            }
         };
         let gradient = here(|| tape.replay_by(loss, redo, take))?;
-        match failure {
+        match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
             Some(failure) => Err(failure),
             None => Ok(gradient.map_err(Failure::from)?),
         }

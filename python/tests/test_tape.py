@@ -154,6 +154,8 @@ def test_checkpoints_replay_to_the_same_numbers():
             for bad in [None, lambda step, world: push(step - 1, world), lambda step, world: world.step()]:
                 with pytest.raises(f.DeformableBodyError, match="leads elsewhere"):
                     tape.backward(control=bad)
+            with pytest.raises(f.DeformableBodyError, match="step 13 is not kept: with checkpoints the tape has the steps from 14 on"):
+                tape.contact_force(13, f.ColliderHandle.from_raw_parts(0, 0))
             with pytest.raises(ZeroDivisionError):
                 tape.backward(control=lambda step, world: 1 / 0)
             lengths = []

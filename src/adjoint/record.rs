@@ -133,20 +133,25 @@ fn twist_record(held: &HeldTwist) -> TwistRecord {
 }
 
 fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
-    let model = body.model();
-    let is_damped = body.materials.iter().any(|m| m.stiffness_damping != 0.0);
-    let is_thin = !(model.triangles.is_empty() && model.stencils.is_empty());
     let why = [
         (body.is_sleeping(), "the body sleeps: it has to be without `can_sleep`"),
         (body.body_type() != RigidBodyType::Dynamic, "the body is not dynamic"),
         (body.settings().integrator != Integrator::ImplicitEuler, "only implicit Euler has one"),
         (body.settings().solver == Solver::Xpbd, "position-based dynamics does not end at a minimum"),
         (body.materials.iter().any(|m| m.branch_count() > 0), "Maxwell branches have none"),
-        (is_damped && is_thin, "stiffness damping of sheets, rods, springs and fibres has none"),
+        (is_thin_damped(body), "stiffness damping of sheets, rods, springs and fibres has none"),
         (body.materials.iter().any(|m| m.orthotropic.is_some()), "woven sheets have none"),
         (body.wind().is_some(), "wind has none"),
     ];
     why.iter().find(|(is_so, _)| *is_so).map_or(Ok(()), |(_, what)| Err(*what))
+}
+
+/// Whether what is thin in a body has stiffness damping.
+fn is_thin_damped(body: &DeformableBody) -> bool {
+    let damping = |region: u32| body.materials[region as usize].stiffness_damping;
+    let model = body.model();
+    model.triangles.iter().any(|triangle| damping(triangle.region) != 0.0)
+        || model.stencils.iter().any(|stencil| stencil.mean(damping) != 0.0)
 }
 
 fn check_step(body: &DeformableBody, solved: &SolvedBody<'_>) -> Result<(), &'static str> {

@@ -17,8 +17,9 @@ use rapier3d::pipeline::PhysicsWorld;
 use std::fmt;
 use std::sync::Arc;
 
-/// Mean edges by which a replay may end elsewhere: the same steps have the same bits, other ones are off by their motion.
-const ELSEWHERE: f64 = 1.0e-9;
+/// Mean edges by which a replay may end elsewhere: what is left of recorded steps, where these have not the same bits. Other steps are off by
+/// their motion.
+const ELSEWHERE: f64 = 1.0e-6;
 
 /// Steps of one body, recorded so that derivatives of a loss with respect to what the body is made of, how it began and what acted on it
 /// can be had: exact ones of the converged steps, for one solve a step. What its user changes between steps (forces, pins,
@@ -74,6 +75,8 @@ pub struct DeformableTape {
     forgotten: usize,
     checkpoint_every: Option<usize>,
     checkpoints: Vec<Checkpoint>,
+    /// The last step has no gradient, and is not recorded: none is replayed through it.
+    is_interrupted: bool,
 }
 
 /// Positions would fill pages.
@@ -100,6 +103,7 @@ impl DeformableTape {
             forgotten: 0,
             checkpoint_every: None,
             checkpoints: Vec::new(),
+            is_interrupted: false,
         })
     }
 
@@ -134,16 +138,19 @@ impl DeformableTape {
         deformables: &mut DeformableWorld,
         take: impl FnOnce(&mut PhysicsWorld, &mut DeformableWorld),
     ) -> Result<(), DeformableBodyError> {
-        if self.checkpoint_every.is_some_and(|every| self.len().is_multiple_of(every)) {
-            let step = self.len();
+        let step = self.len();
+        if self.checkpoint_every.is_some_and(|every| self.is_interrupted || step.is_multiple_of(every)) {
             let checkpoint = Checkpoint::new(step, self.led_to(step), physics, deformables);
+            self.checkpoints.pop_if(|last| last.step == step);
             self.forgotten = step;
             self.steps.clear();
             self.checkpoints.push(checkpoint);
         }
         let gravity = from_real(physics.gravity);
         take(physics, deformables);
-        self.add(physics, deformables, gravity)
+        let added = self.add(physics, deformables, gravity);
+        self.is_interrupted = added.is_err();
+        added
     }
 
     /// Where the step before one has left the body: of steps that are kept, or that a checkpoint comes after.
@@ -207,6 +214,12 @@ impl DeformableTape {
         self.steps.clear();
         self.checkpoints.clear();
         self.forgotten = 0;
+        self.is_interrupted = false;
+    }
+
+    /// The first of the steps that are kept: with checkpoints that after the last one.
+    pub fn first_kept(&self) -> usize {
+        self.forgotten
     }
 
     /// Force \[N\] of a collider on the body in a step, in the solver's precision; zero of steps that are not kept.
@@ -287,7 +300,7 @@ impl DeformableTape {
         let far = ELSEWHERE * self.model.surface.mean_edge;
         let is_there = |(a, b): (&Vec3, &Vec3)| (a - b).amax() <= far;
         if !self.led_to(end).iter().zip(led_to).all(is_there) {
-            let what = "replayed, it leads elsewhere: `control` does not do what was done before the steps";
+            let what = "replayed, it leads elsewhere: `control` does not do what was done, or steps are solved to too little";
             return Err(BodyError::NoGradient { step: end - 1, what });
         }
         Ok(())

@@ -142,3 +142,79 @@ fn by_square(S: &Mat3, B: &Mat3) -> Mat3 {
     });
     V * scaled * V.transpose()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::elastic_forces::{Evaluation, add_forces};
+    use super::super::model::DeformableModel;
+    use super::super::tangents::add_tangents;
+    use super::*;
+    use crate::energy::Elasticity;
+    use crate::material::DeformableMaterial;
+    use crate::mesh::TetMesh;
+    use proptest::prelude::*;
+
+    /// Forces at `x` with damping from `x_start`, at steps of 1 s.
+    fn forces(elements: &Elements<'_>, x: &[Vec3], x_start: &[Vec3]) -> Vec<Vec3> {
+        let mut damping = StiffnessDamping::default();
+        damping.begin(elements, 1.0, x_start, None);
+        let mut f = vec![Vec3::zeros(); x.len()];
+        let at = Evaluation { damping: &damping, x, frame: &Mat3::identity(), limit: f64::INFINITY };
+        add_forces(elements, &at, &mut f);
+        f
+    }
+
+    fn shaken(rest: &[Vec3], shakes: &[f64]) -> Vec<Vec3> {
+        let shake = |i: usize, c: usize| shakes[(3 * i + c) % shakes.len()];
+        rest.iter().enumerate().map(|(i, X)| X + Vec3::from_fn(|c, _| shake(i, c))).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(30))]
+        #[test]
+        fn damping_has_the_derivatives_of_its_forces(
+            shakes in proptest::collection::vec(-0.015..0.015f64, 61),
+            before in proptest::collection::vec(-0.015..0.015f64, 59),
+            beta in 0.1..2.0f64,
+        ) {
+            let block = TetMesh::cuboid([0.1; 3], [1, 1, 2]).unwrap();
+            let in_two = DeformableModel::new(&block).painted(|[_, _, z]| u32::from(z > 0.0));
+            for model in [in_two.clone(), in_two.smoothed()] {
+                let material = DeformableMaterial::new(1e3, 0.3).elasticity(Elasticity::ALL[0]);
+                // Of the second region the energy is the same without damping; ν = 0 has no patches.
+                let materials = [material.stiffness_damping(beta), material.poisson_ratio(0.0)];
+                let elements = Elements { model: &model, materials: &materials, activations: &[1.0, 1.0] };
+                let (x, x_start) = (shaken(&model.rest, &shakes), shaken(&model.rest, &before));
+                let z = shaken(&vec![Vec3::zeros(); x.len()], &before);
+                let (n, mut product) = (x.len(), vec![Vec3::zeros(); x.len()]);
+                let mut add = |i: usize, j: usize, block: &Mat3| {
+                    product[i] += block * z[j];
+                    if i != j {
+                        product[j] += block.tr_mul(&z[i]);
+                    }
+                };
+                let mut damping = StiffnessDamping::default();
+                damping.begin(&elements, 1.0, &x_start, None);
+                add_tangents(&elements, &x, false, |_| 1.0, &mut Vec::new(), &mut add);
+                add_damping_tangents(&elements, &damping, &x, &mut Vec::new(), &mut add);
+                let mut by_start = vec![Vec3::zeros(); n];
+                add_damping_by_start(&elements, &damping, [&x, &x_start], &z, &mut by_start);
+                let eps = 1e-6;
+                let along = |x: &[Vec3], k: f64| -> Vec<Vec3> { x.iter().zip(&z).map(|(x, z)| x + z * (k * eps)).collect() };
+                let slope = |[ahead, behind]: [Vec<Vec3>; 2]| -> Vec<Vec3> {
+                    ahead.iter().zip(&behind).map(|(a, b)| (a - b) / (2.0 * eps)).collect()
+                };
+                let of_x = slope([1.0, -1.0].map(|k| forces(&elements, &along(&x, k), &x_start)));
+                let size = product.iter().map(|p| p.amax()).fold(0.0, f64::max);
+                for (product, slope) in product.iter().zip(&of_x) {
+                    prop_assert!((product + slope).amax() < 1e-5 * size, "{product} {slope}");
+                }
+                // Symmetric by what the start is moved along: any direction will do.
+                let of_start = slope([1.0, -1.0].map(|k| forces(&elements, &x, &along(&x_start, k))));
+                let work = |f: &[Vec3]| f.iter().zip(&z).map(|(f, z)| f.dot(z)).sum::<f64>();
+                let (ours, theirs) = (work(&by_start), work(&of_start));
+                prop_assert!((ours - theirs).abs() < 1e-5 * size * z.iter().map(|z| z.amax()).sum::<f64>(), "{ours} {theirs}");
+            }
+        }
+    }
+}

@@ -69,7 +69,10 @@ pub struct Scene {
     pub steps: usize,
     /// Height of a floor.
     pub floor: Option<f32>,
+    /// Young's moduli of other regions.
     pub regions: Vec<(u32, f64)>,
+    /// Stiffness damping of those, if it is not that of the run.
+    pub beta: Option<f64>,
     pub keeps_spin: bool,
     /// Of a cable, if there is one.
     pub route: Option<Route>,
@@ -126,6 +129,7 @@ impl Scene {
             steps: 30,
             floor: None,
             regions: Vec::new(),
+            beta: None,
             keeps_spin: false,
             route: None,
             look: 7,
@@ -160,7 +164,9 @@ impl Scene {
         });
         let body = &mut world.bodies[handle];
         for (region, modulus) in &self.regions {
-            body.set_region_material(*region, run.material.youngs_modulus(*modulus)).unwrap();
+            let beta = self.beta.unwrap_or(run.material.stiffness_damping);
+            let material = run.material.youngs_modulus(*modulus).stiffness_damping(beta);
+            body.set_region_material(*region, material).unwrap();
         }
         let far = |v: &usize| body.position(*v).unwrap()[0];
         let tip = (0..body.vertex_count()).max_by(|a, b| far(a).total_cmp(&far(b))).unwrap();

@@ -80,19 +80,22 @@ fn numbers_of(factor: &mut SystemFactor) -> Option<&mut Vec<f64>> {
 impl NewtonFactors {
     /// Forgets those of the last step.
     pub fn begin(&mut self, bodies: usize) {
-        (0..self.made.len()).for_each(|index| self.forget(index));
+        // The memory that was given back last is taken first: each body gets its own.
+        (0..self.made.len()).rev().for_each(|index| self.forget(index));
         self.made.clear();
         self.made.resize_with(bodies, || None);
     }
 
     fn forget(&mut self, index: usize) {
         let Some(OwnFactor { mut factor, .. }) = self.made[index].take() else { return };
-        let columns = factor.columns.len();
-        if let Some(numbers) = numbers_of(&mut factor)
-            && numbers.len() + columns <= KEPT_NUMBERS
-        {
-            self.spare.push(factor);
+        let numbers = numbers_of(&mut factor).map_or(usize::MAX, |numbers| numbers.len());
+        if numbers > KEPT_NUMBERS {
+            return;
         }
+        if numbers + factor.columns.len() > KEPT_NUMBERS {
+            factor.columns.clear();
+        }
+        self.spare.push(factor);
     }
 
     /// Makes the factors at the bodies' current states; true if there are bodies that want them.

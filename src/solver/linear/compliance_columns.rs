@@ -187,6 +187,7 @@ impl ComplianceColumns {
 
     pub fn clear(&mut self) {
         self.columns.fill(None);
+        self.spare.clear();
         self.made = 0;
     }
 }
