@@ -3,9 +3,7 @@
 #[path = "common/differences.rs"]
 mod differences;
 
-use differences::{
-    FRICTION, LAUNCH, LOADS, MATERIAL, Outcome, Parameter, Run, Scene, largest_error, state_error,
-};
+use differences::{FRICTION, LAUNCH, LOADS, MATERIAL, Parameter, Run, Scene, force_error, state_error};
 use foible3d::prelude::*;
 use foible3d::{BodyError, DeformableBodyError};
 use rapier3d::prelude::*;
@@ -33,15 +31,8 @@ fn errors(scene: &Scene, run: &Run, with_friction: bool, unfelt: &[&str]) -> [f6
     let loads = || MATERIAL.iter().chain(&LOADS).chain([&LAUNCH]).chain(by_friction.clone());
     let of_state = state_error(scene, run, loads());
     println!(" contact force");
-    let across = [0.25, 1.0, -0.5];
-    let force = |out: &Outcome| (0..3).map(|k| across[k] * out.contact_force[k]).sum::<f64>();
-    let seeds = |out: &Outcome| {
-        let mut seeds = out.tape.loss();
-        seeds.add_contact_force(scene.look, out.floor.unwrap(), across).unwrap();
-        seeds
-    };
     let is_felt = |p: &&Parameter| !unfelt.contains(&p.name);
-    [of_state, largest_error(scene, run, &force, &seeds, loads().filter(is_felt))]
+    [of_state, force_error(scene, run, loads().filter(is_felt))]
 }
 
 #[test]

@@ -3,8 +3,8 @@
 #[path = "common/differences.rs"]
 mod differences;
 
-use differences::{FRICTION, LAUNCH, LOADS, MATERIAL, Outcome, PINS, Parameter, Run, Scene};
-use differences::{largest_error, state_error};
+use differences::{FRICTION, LAUNCH, LOADS, MATERIAL, PINS, Parameter, Run, Scene};
+use differences::{force_error, state_error};
 use foible3d::prelude::*;
 use foible3d::{BodyError, DeformableBodyError};
 use rapier3d::prelude::*;
@@ -98,16 +98,9 @@ fn errors_on_a_floor([friction, launch, stride]: [f64; 3], look: usize) -> [f64;
     let all = || MATERIAL.iter().chain(&LOADS).chain([&LAUNCH, &DAMPING]).chain(slides.clone());
     let of_state = state_error(&scene, &run, all());
     println!(" contact force");
-    let across = [0.25, 1.0, -0.5];
-    let force = |out: &Outcome| (0..3).map(|k| across[k] * out.contact_force[k]).sum::<f64>();
-    let seeds = |out: &Outcome| {
-        let mut seeds = out.tape.loss();
-        seeds.add_contact_force(scene.look, out.floor.unwrap(), across).unwrap();
-        seeds
-    };
     // The force hardly knows of them.
     let is_felt = |p: &&Parameter| p.name != "initial position";
-    [of_state, largest_error(&scene, &run, &force, &seeds, all().filter(is_felt))]
+    [of_state, force_error(&scene, &run, all().filter(is_felt))]
 }
 
 #[test]

@@ -17,7 +17,7 @@ struct Damped<'a> {
     element: &'a SolidElement<'a>,
     mu: f64,
     lambda: f64,
-    /// Its volume, times β/h and what branches add \[m³\].
+    /// Its volume, times β/h \[m³\].
     weight: f64,
     stretch: Mat3,
     F: Mat3,
@@ -56,17 +56,11 @@ pub(crate) fn add_damping_by_start(
 ) {
     for_each_damped(elements, damping, x, |damped| {
         let SolidElement { nodes, gradients, .. } = *damped.element;
-        let of_stretch = damped.work_by_stretch(&gradient_of(damped.element, z));
-        let F_start = gradient_of(damped.element, x_start);
+        let of_stretch = damped.work_by_stretch(&damped.element.deformation_gradient(z));
+        let F_start = damped.element.deformation_gradient(x_start);
         let of_gradient = F_start * by_square(&damped.stretch, &of_stretch) * 2.0;
         nodes.iter().zip(gradients).for_each(|(n, g)| of_start[*n as usize] += of_gradient * g);
     });
-}
-
-/// `Σ_a x_a g_aᵀ`.
-fn gradient_of(element: &SolidElement<'_>, x: &[Vec3]) -> Mat3 {
-    let pairs = element.nodes.iter().zip(element.gradients);
-    pairs.fold(Mat3::zeros(), |F, (&n, g)| F + x[n as usize] * g.transpose())
 }
 
 fn for_each_damped(
@@ -88,7 +82,7 @@ fn for_each_damped(
             lambda: lame.lambda,
             weight: element.volume * ratio,
             stretch: block.lane(element.place[1]),
-            F: gradient_of(element, x),
+            F: element.deformation_gradient(x),
         });
     });
 }

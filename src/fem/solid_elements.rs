@@ -6,8 +6,8 @@ use super::regions::Region;
 use super::smoothing::SmoothingDomains;
 use crate::energy::Lame;
 use crate::material::DeformableMaterial;
-use crate::math::Vec3;
 use crate::math::lanes::LANES;
+use crate::math::{Mat3, Vec3};
 use crate::mesh::node_adjacency;
 
 /// What an energy is of: the material, and what of Lamé's constants it has.
@@ -31,6 +31,14 @@ pub(crate) struct SolidElement<'a> {
     pub volume: f64,
     /// Its block of four, among those of tetrahedra, of domains around edges, or of patches, and its place in that.
     pub place: [usize; 2],
+}
+
+impl SolidElement<'_> {
+    /// `F = Σ_a x_a g_aᵀ`.
+    pub fn deformation_gradient(&self, x: &[Vec3]) -> Mat3 {
+        let pairs = self.nodes.iter().zip(self.gradients);
+        pairs.fold(Mat3::zeros(), |F, (&n, g)| F + x[n as usize] * g.transpose())
+    }
 }
 
 impl DeformableModel {

@@ -47,8 +47,7 @@ impl StiffnessDamping {
     /// Takes the stretches at `x`, or what they and those `before` amount to in a step of the second order; `h` \[s\].
     pub fn begin(&mut self, elements: &Elements<'_>, h: f64, x: &[Vec3], before: Option<&[Vec3]>) {
         let Elements { model, materials, .. } = elements;
-        self.ratios.clear();
-        self.ratios.extend(materials.iter().map(|material| material.stiffness_damping / h));
+        self.with_materials(materials, h);
         self.stretches.clear();
         if self.dampers.is_empty() && self.ratios.iter().all(|ratio| *ratio == 0.0) {
             return;

@@ -23,8 +23,7 @@ pub(crate) fn add_tangents(
     model.for_each_energy(materials, |law, element| {
         let (material, lame) = (law.material, law.lame);
         let SolidElement { nodes, gradients, volume, .. } = *element;
-        let F =
-            nodes.iter().zip(gradients).fold(Mat3::zeros(), |F, (&n, g)| F + x[n as usize] * g.transpose());
+        let F = element.deformation_gradient(x);
         let modes: [Mode; 9] = with_energy!(material, lame, energy => modes(&F, |s| energy.principal(s)));
         sides.clear();
         sides.extend(modes.iter().flat_map(|m| gradients.iter().map(|g| m.shape * g)));

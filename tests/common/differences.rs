@@ -386,3 +386,15 @@ pub fn largest_error<'a>(
 pub fn state_error<'a>(scene: &Scene, run: &Run, parameters: impl IntoIterator<Item = &'a Parameter>) -> f64 {
     largest_error(scene, run, &|out| out.loss, &|out| out.seeds.clone(), parameters)
 }
+
+/// As [`largest_error`], of the force of the floor in the step that the scene looks at, in a direction askew.
+pub fn force_error<'a>(scene: &Scene, run: &Run, parameters: impl IntoIterator<Item = &'a Parameter>) -> f64 {
+    let across = [0.25, 1.0, -0.5];
+    let force = |out: &Outcome| (0..3).map(|k| across[k] * out.contact_force[k]).sum::<f64>();
+    let seeds = |out: &Outcome| {
+        let mut seeds = out.tape.loss();
+        seeds.add_contact_force(scene.look, out.floor.unwrap(), across).unwrap();
+        seeds
+    };
+    largest_error(scene, run, &force, &seeds, parameters)
+}
