@@ -71,13 +71,24 @@ pub(crate) fn attached_nodes(
     }
 }
 
-/// Lists the nodes that hard attachments hold to bodies that yield, each with where that body takes it in the step \[m\], its turn exact.
+/// A node that a rigid body carries.
+#[derive(Clone, Copy)]
+pub(crate) struct CarriedNode {
+    pub body: DeformableBodyHandle,
+    pub node: u32,
+    /// The rigid body.
+    pub by: ProxyId,
+    /// Where that takes it \[m\].
+    pub end: Vec3,
+}
+
+/// Lists the nodes that hard attachments hold to bodies that yield, each with where that body takes it in the step, its turn exact.
 pub(crate) fn carried_nodes(
     deformables: &DeformableBodySet,
     scene: &mut RapierScene,
     context: &StepContext<'_>,
     reactions: &[Reaction],
-    carried: &mut Vec<(DeformableBodyHandle, u32, Vec3)>,
+    carried: &mut Vec<CarriedNode>,
 ) {
     for (_, attachment) in deformables.attachments().filter(|(_, a)| a.is_hard()) {
         let Anchors::Rigid(rigid, points) = &attachment.anchors else { continue };
@@ -86,7 +97,10 @@ pub(crate) fn carried_nodes(
         let Some(end) = scene.proxies.carries(proxy, reactions, context.h) else { continue };
         let start = Pose64::from_real(body.position());
         let nodes = attachment.nodes.iter().zip(points);
-        carried.extend(nodes.map(|(node, point)| (attachment.body(), *node, end(&start.transform(point)))));
+        carried.extend(nodes.map(|(node, point)| {
+            let end = end(&start.transform(point));
+            CarriedNode { body: attachment.body(), node: *node, by: proxy, end }
+        }));
     }
 }
 
