@@ -321,7 +321,8 @@ impl PyGradient {
         self.0.friction
     }
 
-    /// With respect to the materials of the regions, in the order of ``DeformableBody.regions``: arrays of shape (k,) by the names of ``Material``.
+    /// With respect to the materials of the regions, in the order of ``DeformableBody.regions``: arrays of shape (k,) by the names of ``Material``,
+    /// and of shape (k, 4) ``maxwell_ratios`` and ``maxwell_times`` of the branches.
     #[getter]
     fn materials<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = PyDict::new(py);
@@ -330,6 +331,9 @@ impl PyGradient {
         found.set_item("density", self.by_region(py, |m| m.density))?;
         found.set_item("mass_damping", self.by_region(py, |m| m.mass_damping))?;
         found.set_item("stiffness_damping", self.by_region(py, |m| m.stiffness_damping))?;
+        let materials = self.0.materials.iter();
+        found.set_item("maxwell_ratios", rows(py, materials.clone().map(|m| m.maxwell_ratios).collect())?)?;
+        found.set_item("maxwell_times", rows(py, materials.map(|m| m.maxwell_times).collect())?)?;
         found.set_item("fibre_modulus", self.by_region(py, |m| m.fibre_modulus))?;
         Ok(found)
     }

@@ -8,10 +8,11 @@ import foible3d as f
 STEPS = 20
 
 
-def swing(modulus=1e5, beta=0.0, density=1000.0, push=0.5, pressure=None, friction=0.0, floor=None, start=0.0, every=None):
+def swing(modulus=1e5, beta=0.0, branches=(), density=1000.0, push=0.5, pressure=None, friction=0.0, floor=None, start=0.0, every=None):
     """A bar that is held at one end, or lies on a floor; with the tape of it."""
     world = f.World()
-    material = f.Material(modulus, 0.3, density=density, mass_damping=1.0, stiffness_damping=beta, friction=0.0)
+    material = f.Material(modulus, 0.3, density=density, mass_damping=1.0, stiffness_damping=beta, friction=0.0,
+                          maxwell_branches=list(branches))
     options = dict(material=material, fidelity=f.Fidelity.REFERENCE, can_sleep=False, tolerance=1e-12, contact_tolerance=1e-12)
     handle = world.add_deformable(f.DeformableBody.cuboid((0.25, 0.0625, 0.0625), (4, 1, 1), max_iterations=400, **options))
     body = world.deformable_bodies[handle]
@@ -127,6 +128,24 @@ def test_stiffness_damping_has_a_gradient():
     (found,) = tape.backward(positions={-1: of_positions}).materials["stiffness_damping"]
     slope = (loss(0.01 + 1e-5)[0] - loss(0.01 - 1e-5)[0]) / 2e-5
     assert found == pytest.approx(slope, rel=1e-4) and found != 0.0
+
+
+def test_maxwell_branches_have_gradients():
+    def loss(ratio, time):
+        _, body, tape, tip, _ = swing(branches=[(0.5, 0.2), (ratio, time)])
+        tape.step(STEPS)
+        return body.positions[tip, 2], body, tape, tip
+
+    _, body, tape, tip = loss(0.8, 0.05)
+    of_positions = np.zeros((body.vertex_count, 3))
+    of_positions[tip, 2] = 1.0
+    found = tape.backward(positions={-1: of_positions}).materials
+    assert found["maxwell_ratios"].shape == found["maxwell_times"].shape == (1, 4)
+    of_ratio = (loss(0.801, 0.05)[0] - loss(0.799, 0.05)[0]) / 2e-3
+    of_time = (loss(0.8, 0.0501)[0] - loss(0.8, 0.0499)[0]) / 2e-4
+    assert found["maxwell_ratios"][0, 1] == pytest.approx(of_ratio, rel=1e-4) and of_ratio != 0.0
+    assert found["maxwell_times"][0, 1] == pytest.approx(of_time, rel=1e-4) and of_time != 0.0
+    assert not found["maxwell_ratios"][0, 2:].any()
 
 
 def test_checkpoints_replay_to_the_same_numbers():

@@ -6,14 +6,15 @@
 use super::cables::{CableRecord, EndOfCable, OfCable, along};
 use super::contact_rows::ContactRows;
 use super::filled_rooms::of_pressures;
-use super::gradient::{CableGradient, DeformableGradient, StepGradient};
+use super::gradient::{CableGradient, DeformableGradient, MaterialGradient, StepGradient};
 use super::loss::Seed;
 use super::parameters::{ElasticWork, Inertia};
 use super::record::{ContactRecord, StepRecord};
 use super::spin::{Cotangents, through_spin};
 use super::tangent::Tangent;
 use crate::body::DeformableCableHandle;
-use crate::fem::{DeformableModel, Elements, StiffnessDamping, add_damping_by_start};
+use crate::fem::{DampedStep, DeformableModel, Elements, StiffnessDamping, Stretches};
+use crate::material::MAX_BRANCHES;
 use crate::math::Vec3;
 
 /// What goes backward over the steps.
@@ -21,10 +22,11 @@ pub(super) struct Backward<'a> {
     model: &'a DeformableModel,
     tangent: Tangent,
     force: Vec<Vec3>,
-    /// With respect to the state between two steps: positions, velocities, and cables.
+    /// With respect to the state between two steps: positions, velocities, cables, and what dampers have given way by.
     pub x: Vec<Vec3>,
     pub v: Vec<Vec3>,
     cables: Vec<(DeformableCableHandle, EndOfCable)>,
+    dampers: Vec<Stretches>,
 }
 
 /// Derivatives of a loss with respect to the forces of a step: of colliders, and of its cables.
@@ -52,7 +54,15 @@ impl<'a> Backward<'a> {
     pub fn new(model: &'a DeformableModel) -> Option<Self> {
         let zeros = vec![Vec3::zeros(); model.rest.len()];
         let tangent = Tangent::new(model)?;
-        Some(Self { model, tangent, force: Vec::new(), x: zeros.clone(), v: zeros, cables: Vec::new() })
+        Some(Self {
+            model,
+            tangent,
+            force: Vec::new(),
+            x: zeros.clone(),
+            v: zeros,
+            cables: Vec::new(),
+            dampers: Vec::new(),
+        })
     }
 
     /// Goes through a step, with what the loss says of the forces in it.
@@ -67,14 +77,23 @@ impl<'a> Backward<'a> {
     ) -> Result<(), &'static str> {
         let (model, h) = (self.model, record.h);
         let inertia = Inertia::new(model, &record.materials);
+        let elements = Elements { model, materials: &record.materials, activations: &record.activations };
+        let damping = record.damping(model, &record.materials);
+        let damped = DampedStep {
+            elements: &elements,
+            damping: &damping,
+            h,
+            x_start: &record.x_start,
+            x_end: &record.x_end,
+        };
         let mut of = Cotangents::new(std::mem::take(&mut self.x), std::mem::take(&mut self.v));
+        self.give_way_back(&damped, &mut of.x_end, &mut out.materials);
         if record.keeps_spin {
             through_spin(record, &inertia, &mut of);
         }
         let g: Vec<Vec3> = of.x_end.iter().zip(&of.v_end).map(|(x, v)| x + v / h).collect();
         of.x_start.iter_mut().zip(&of.v_end).for_each(|(x, v)| *x -= v / h);
         let of_forces = self.of_forces(record, seed)?;
-        let mut damping = record.damping(model);
         let Solved { z, of_pins, cables } =
             self.solve(record, (&inertia, &damping), &of_forces, g, &mut of)?;
         let between = record.cables.iter().zip(&cables).map(|(cable, of)| (cable.handle, of.before));
@@ -82,10 +101,9 @@ impl<'a> Backward<'a> {
         out.friction += of.friction;
         add_inertia(record, &inertia, &z, &mut of);
         if damping.resists() {
-            let elements = Elements { model, materials: &record.materials, activations: &record.activations };
-            add_damping_by_start(&elements, &damping, [&record.x_end, &record.x_start], &z, &mut of.x_start);
+            damped.add_by_start(&z, &mut of.x_start, &mut self.dampers);
         }
-        let mut work = ElasticWork { model, record, z: &z, damping: &mut damping, force: &mut self.force };
+        let mut work = ElasticWork { model, record, z: &z, damping: &damping, force: &mut self.force };
         work.add_materials(&mut out.materials);
         work.add_twists(&mut out.materials);
         let activation = work.activation();
@@ -103,6 +121,19 @@ impl<'a> Backward<'a> {
         });
         (self.x, self.v) = (of.x_start, of.v_start);
         Ok(())
+    }
+
+    /// Goes through how dampers have given way over the step.
+    fn give_way_back(&mut self, damped: &DampedStep<'_>, of_end: &mut [Vec3], out: &mut [MaterialGradient]) {
+        self.dampers.resize_with(damped.damping.dampers().len(), || Stretches::zeros(self.model));
+        if self.dampers.is_empty() {
+            return;
+        }
+        let mut of_times = vec![[0.0; MAX_BRANCHES]; out.len()];
+        damped.give_way_back(&mut self.dampers, of_end, &mut of_times);
+        for (out, of) in out.iter_mut().zip(of_times) {
+            out.maxwell_times.iter_mut().zip(of).for_each(|(out, of)| *out += of);
+        }
     }
 
     /// Solves for z, and for what is with respect to the targets of pins; adds what contacts say of the start, and of friction.

@@ -1,6 +1,7 @@
 //! Derivatives of a loss, as users read them.
 
 use crate::body::DeformableCableHandle;
+use crate::material::MAX_BRANCHES;
 
 /// Derivatives of a loss with respect to the material of a region.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -16,6 +17,10 @@ pub struct MaterialGradient {
     pub mass_damping: f64,
     /// Per second of stiffness damping β; zero where there is none.
     pub stiffness_damping: f64,
+    /// Of the ratios of the Maxwell branches, in their order, with what their dampers had given way by at first; zero of those that are not there.
+    pub maxwell_ratios: [f64; MAX_BRANCHES],
+    /// Per second of their times, also of those that are there in some of the steps.
+    pub maxwell_times: [f64; MAX_BRANCHES],
     /// Per pascal of the fibres' modulus.
     pub fibre_modulus: f64,
 }
@@ -81,6 +86,8 @@ impl DeformableGradient {
             density: sum.density + m.density,
             mass_damping: sum.mass_damping + m.mass_damping,
             stiffness_damping: sum.stiffness_damping + m.stiffness_damping,
+            maxwell_ratios: std::array::from_fn(|k| sum.maxwell_ratios[k] + m.maxwell_ratios[k]),
+            maxwell_times: std::array::from_fn(|k| sum.maxwell_times[k] + m.maxwell_times[k]),
             fibre_modulus: sum.fibre_modulus + m.fibre_modulus,
         })
     }

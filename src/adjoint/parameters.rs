@@ -26,21 +26,26 @@ pub(super) struct ElasticWork<'a> {
     pub model: &'a DeformableModel,
     pub record: &'a StepRecord,
     pub z: &'a [Vec3],
-    /// The stiffness damping of the step.
-    pub damping: &'a mut StiffnessDamping,
+    /// What resists in the step.
+    pub damping: &'a StiffnessDamping,
     pub force: &'a mut Vec<Vec3>,
 }
 
 impl ElasticWork<'_> {
     fn of(&mut self, materials: &[DeformableMaterial], activations: &[f64]) -> f64 {
+        self.with(self.damping, materials, activations)
+    }
+
+    fn with(
+        &mut self,
+        damping: &StiffnessDamping,
+        materials: &[DeformableMaterial],
+        activations: &[f64],
+    ) -> f64 {
         self.force.clear();
         self.force.resize(self.z.len(), Vec3::zeros());
         let elements = Elements { model: self.model, materials, activations };
-        if self.damping.resists() {
-            self.damping.with_materials(materials, self.record.h);
-        }
-        let (damping, frame) = (&*self.damping, Mat3::identity());
-        let x = &self.record.x_end;
+        let (x, frame) = (&self.record.x_end, Mat3::identity());
         let at = Evaluation { damping, x, frame: &frame, limit: f64::INFINITY };
         add_forces(&elements, &at, self.force);
         dot(self.force, self.z)
@@ -54,12 +59,32 @@ impl ElasticWork<'_> {
         scheme: &[(f64, f64)],
         set: impl Fn(&mut DeformableMaterial, f64),
     ) -> f64 {
+        self.difference(region, (by, scheme), set, |work, materials| {
+            work.of(materials, &work.record.activations)
+        })
+    }
+
+    /// The same of what resists motion.
+    fn along_damping(&mut self, region: usize, by: f64, set: impl Fn(&mut DeformableMaterial, f64)) -> f64 {
+        self.difference(region, (by, CENTRAL), set, |work, materials| {
+            let damping = work.record.damping(work.model, materials);
+            work.with(&damping, materials, &work.record.activations)
+        })
+    }
+
+    fn difference(
+        &mut self,
+        region: usize,
+        (by, scheme): (f64, &[(f64, f64)]),
+        set: impl Fn(&mut DeformableMaterial, f64),
+        mut of: impl FnMut(&mut Self, &[DeformableMaterial]) -> f64,
+    ) -> f64 {
         let mut materials = self.record.materials.clone();
         let mut sum = 0.0;
         for (place, weight) in scheme {
             materials[region] = self.record.materials[region];
             set(&mut materials[region], place * by);
-            sum += weight * self.of(&materials, &self.record.activations);
+            sum += weight * of(self, &materials);
         }
         sum / by
     }
@@ -84,14 +109,26 @@ impl ElasticWork<'_> {
             // Below nought smoothed elements have no volume to keep.
             let scheme = if poisson_ratio > apart { LINEAR } else { FORWARD };
             out.poisson_ratio += self.along(region, apart, scheme, |m, d| m.poisson_ratio += d);
-            let beta = self.record.materials[region].stiffness_damping;
-            if beta != 0.0 {
-                out.stiffness_damping +=
-                    self.along(region, 0.5 * beta, LINEAR, |m, d| m.stiffness_damping += d);
-            }
+            self.add_damping(region, out);
             if self.model.has_fibres() {
                 out.fibre_modulus += self.along(region, by, LINEAR, |m, d| m.fibre_modulus += d);
             }
+        }
+    }
+
+    /// Adds what resists motion says, with what dampers have given way by as it is.
+    fn add_damping(&mut self, region: usize, out: &mut MaterialGradient) {
+        let material = self.record.materials[region];
+        let beta = material.stiffness_damping;
+        if beta != 0.0 {
+            out.stiffness_damping +=
+                self.along_damping(region, DIFFERENCE * beta, |m, d| m.stiffness_damping += d);
+        }
+        for (k, branch) in material.maxwell_branches.iter().enumerate().filter(|(_, b)| b.ratio > 0.0) {
+            let [ratio, time] = [branch.ratio, branch.time].map(|whole| DIFFERENCE * whole);
+            out.maxwell_ratios[k] +=
+                self.along_damping(region, ratio, |m, d| m.maxwell_branches[k].ratio += d);
+            out.maxwell_times[k] += self.along_damping(region, time, |m, d| m.maxwell_branches[k].time += d);
         }
     }
 

@@ -5,7 +5,7 @@ use super::held_twists::TwistRecord;
 use crate::body::{ConstraintKey, DeformableBody, HeldTwist, Integrator, Solver};
 use crate::contact::{Endpoint, Law};
 use crate::energy::CavityFilling;
-use crate::fem::{DeformableModel, Elements, StiffnessDamping};
+use crate::fem::{Dampers, DeformableModel, Elements, StiffnessDamping};
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
 use crate::pipeline::{SolvedBody, SolvedContact};
@@ -36,6 +36,8 @@ pub(super) struct StepRecord {
     pub x_end: Vec<Vec3>,
     pub materials: Vec<DeformableMaterial>,
     pub activations: Vec<f64>,
+    /// At the start; of materials without Maxwell branches none.
+    pub dampers: Dampers,
     /// Of the cavities; empty while there are none.
     pub fillings: Vec<Option<CavityFilling>>,
     /// Rods that were held against roll.
@@ -101,6 +103,7 @@ impl StepRecord {
             x_end: body.state.x.clone(),
             materials: body.materials.clone(),
             activations: body.activations.clone(),
+            dampers: problem.dampers().clone(),
             fillings: body.fillings.clone(),
             twists: body.state.twists.iter().map(twist_record).collect(),
             gravity,
@@ -114,10 +117,11 @@ impl StepRecord {
 }
 
 impl StepRecord {
-    /// The stiffness damping of the step.
-    pub fn damping(&self, model: &DeformableModel) -> StiffnessDamping {
+    /// What resists in the step, of its materials or others.
+    pub fn damping(&self, model: &DeformableModel, materials: &[DeformableMaterial]) -> StiffnessDamping {
         let mut damping = StiffnessDamping::default();
-        let elements = Elements { model, materials: &self.materials, activations: &self.activations };
+        let elements = Elements { model, materials, activations: &self.activations };
+        damping.take_dampers(&elements, &self.dampers);
         damping.begin(&elements, self.h, &self.x_start, None);
         damping
     }
@@ -138,20 +142,25 @@ fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
         (body.body_type() != RigidBodyType::Dynamic, "the body is not dynamic"),
         (body.settings().integrator != Integrator::ImplicitEuler, "only implicit Euler has one"),
         (body.settings().solver == Solver::Xpbd, "position-based dynamics does not end at a minimum"),
-        (body.materials.iter().any(|m| m.branch_count() > 0), "Maxwell branches have none"),
-        (is_thin_damped(body), "stiffness damping of sheets, rods, springs and fibres has none"),
+        (
+            is_thin_damped(body),
+            "stiffness damping and Maxwell branches of sheets, rods, springs and fibres have none",
+        ),
         (body.materials.iter().any(|m| m.orthotropic.is_some()), "woven sheets have none"),
         (body.wind().is_some(), "wind has none"),
     ];
     why.iter().find(|(is_so, _)| *is_so).map_or(Ok(()), |(_, what)| Err(*what))
 }
 
-/// Whether what is thin in a body has stiffness damping.
+/// Whether what is thin in a body has stiffness damping or Maxwell branches.
 fn is_thin_damped(body: &DeformableBody) -> bool {
-    let damping = |region: u32| body.materials[region as usize].stiffness_damping;
+    let is_damped = |region: u32| {
+        let material = &body.materials[region as usize];
+        material.stiffness_damping != 0.0 || material.branch_count() > 0
+    };
     let model = body.model();
-    model.triangles.iter().any(|triangle| damping(triangle.region) != 0.0)
-        || model.stencils.iter().any(|stencil| stencil.mean(damping) != 0.0)
+    model.triangles.iter().any(|triangle| is_damped(triangle.region))
+        || model.stencils.iter().any(|stencil| stencil.mean(|region| f64::from(is_damped(region))) != 0.0)
 }
 
 fn check_step(body: &DeformableBody, solved: &SolvedBody<'_>) -> Result<(), &'static str> {
@@ -232,6 +241,7 @@ impl StepRecord {
             x_end: x.to_vec(),
             materials: elements.materials.to_vec(),
             activations: elements.activations.to_vec(),
+            dampers: Dampers::new(),
             fillings: Vec::new(),
             twists: Vec::new(),
             gravity: Vec3::zeros(),

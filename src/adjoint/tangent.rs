@@ -5,6 +5,7 @@ use super::directions::Directions;
 use super::filled_rooms::{FilledRoom, filled_rooms};
 use super::record::StepRecord;
 use crate::fem::{DeformableModel, Elements, StiffnessDamping, SystemMatrix, add_damping_tangents};
+use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3};
 use crate::solver::linear::{
     Factor, FactorScratch, MatrixValues, Symbolic, TangentPlace, assemble_tangent, assemble_tangent_beside,
@@ -67,7 +68,8 @@ impl Tangent {
         let place = TangentPlace { x, projected: false, pins, h };
         let mut matrix = MatrixValues::default();
         // Of damping there is all of it, not its leading part.
-        let undamped: Vec<_> = materials.iter().map(|material| material.stiffness_damping(0.0)).collect();
+        let bare = |material: &DeformableMaterial| material.stiffness_damping(0.0).maxwell_branches([]);
+        let undamped: Vec<_> = materials.iter().map(bare).collect();
         let bare = Elements { materials: &undamped, ..elements };
         assemble_tangent_beside(&bare, &place, (symbolic, &mut matrix), others, |i, j, block| {
             beside.push((i, j, *block));

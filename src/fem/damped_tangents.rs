@@ -1,4 +1,4 @@
-//! Second derivatives of stiffness damping, of solids: what gradients over steps need of it.
+//! Second derivatives of stiffness damping and Maxwell branches, of solids: what gradients over steps need of them.
 //!
 //! With the stretch S at the start of the step the density is, per β/h, `μ(‖F‖² + ‖S‖²) − 2μ N(FS) + λ/2 (N(F) − tr S)²`, with the
 //! sum N of the (signed) principal stretches: that of F and that of FS are isotropic, and have the modes of such energies
@@ -7,17 +7,21 @@
 use super::model::Elements;
 use super::solid_elements::{Law, SolidElement};
 use super::stiffness_damping::StiffnessDamping;
+use super::stretches::Stretches;
 use super::tangents::add_products;
 use crate::energy::{Mode, Principal, modes};
+use crate::material::MAX_BRANCHES;
 use crate::math::polar::signed_svd;
 use crate::math::{Mat3, Vec3};
 
 /// A solid element that is damped.
 struct Damped<'a> {
     element: &'a SolidElement<'a>,
+    region: usize,
+    is_patch: bool,
     mu: f64,
     lambda: f64,
-    /// Its volume, times β/h \[m³\].
+    /// Its volume, times β/h and what branches add \[m³\].
     weight: f64,
     stretch: Mat3,
     F: Mat3,
@@ -46,21 +50,73 @@ pub(crate) fn add_damping_tangents(
     });
 }
 
-/// Adds to `of_start` what positions at the start of the step change of the virtual work of its damping along `z`, `z·∂f/∂xₙ`.
-pub(crate) fn add_damping_by_start(
-    elements: &Elements<'_>,
-    damping: &StiffnessDamping,
-    [x, x_start]: [&[Vec3]; 2],
-    z: &[Vec3],
-    of_start: &mut [Vec3],
-) {
-    for_each_damped(elements, damping, x, |damped| {
-        let SolidElement { nodes, gradients, .. } = *damped.element;
-        let of_stretch = damped.work_by_stretch(&damped.element.deformation_gradient(z));
-        let F_start = damped.element.deformation_gradient(x_start);
-        let of_gradient = F_start * by_square(&damped.stretch, &of_stretch) * 2.0;
-        nodes.iter().zip(gradients).for_each(|(n, g)| of_start[*n as usize] += of_gradient * g);
-    });
+/// What a step of `h` \[s\] sets out from.
+#[derive(Clone, Copy)]
+pub(crate) struct DampedStep<'a> {
+    pub elements: &'a Elements<'a>,
+    pub damping: &'a StiffnessDamping,
+    pub h: f64,
+    pub x_start: &'a [Vec3],
+    pub x_end: &'a [Vec3],
+}
+
+impl DampedStep<'_> {
+    /// Adds what the start changes of the virtual work of damping along `z`: of positions, `z·∂f/∂xₙ`, and of each damper's stretch.
+    pub fn add_by_start(&self, z: &[Vec3], of_start: &mut [Vec3], of_dampers: &mut [Stretches]) {
+        let materials = self.elements.materials;
+        for_each_damped(self.elements, self.damping, self.x_end, |damped| {
+            let SolidElement { nodes, gradients, place, .. } = *damped.element;
+            let of_stretch = damped.work_by_stretch(&damped.element.deformation_gradient(z));
+            let material = &materials[damped.region];
+            let whole = self.damping.ratios[damped.region];
+            for (damper, branch) in of_dampers.iter_mut().zip(&material.maxwell_branches) {
+                damper.add(damped.is_patch, place, &(of_stretch * (branch.resistance(self.h) / whole)));
+            }
+            let own = material.stiffness_damping / self.h / whole;
+            if own != 0.0 {
+                let F = damped.element.deformation_gradient(self.x_start);
+                let of_gradient = of_deformation(&F, &(of_stretch * own));
+                nodes.iter().zip(gradients).for_each(|(n, g)| of_start[*n as usize] += of_gradient * g);
+            }
+        });
+    }
+
+    /// Goes through how the dampers give way, `D′ = (τ D + h S′)/(τ + h)`: what is with respect to D′ becomes that with respect to D; adds what is of
+    /// the end and of the times.
+    pub fn give_way_back(
+        &self,
+        of_dampers: &mut [Stretches],
+        of_end: &mut [Vec3],
+        of_times: &mut [[f64; MAX_BRANCHES]],
+    ) {
+        let (Elements { model, materials, .. }, h) = (self.elements, self.h);
+        let dampers = self.damping.dampers();
+        // Patches of a material that keeps no volume have dampers, too.
+        let all: Vec<_> = materials.iter().map(|material| material.poisson_ratio(0.25)).collect();
+        model.for_each_energy(&all, |law, element| {
+            let Law { region, is_patch, .. } = *law;
+            let [block, lane] = element.place;
+            let F = element.deformation_gradient(self.x_end);
+            let (U, _, V) = signed_svd(&F);
+            let S = V * U.transpose() * F;
+            let mut of_stretch = Mat3::zeros();
+            for (k, of) in of_dampers.iter_mut().enumerate() {
+                let time = materials[region].maxwell_branches[k].time;
+                let (Some(of_damper), Some(damper)) =
+                    (of.block(is_patch, block), dampers[k].block(is_patch, block))
+                else {
+                    continue;
+                };
+                let (of_damper, damper) = (of_damper.lane(lane), damper.lane(lane));
+                of_stretch += of_damper * (h / (time + h));
+                of_times[region][k] += of_damper.dot(&(damper - S)) * (h / (time + h).powi(2));
+                of.add(is_patch, element.place, &(of_damper * (-h / (time + h))));
+            }
+            let of_gradient = of_deformation(&F, &of_stretch);
+            let ends = element.nodes.iter().zip(element.gradients);
+            ends.for_each(|(n, g)| of_end[*n as usize] += of_gradient * g);
+        });
+    }
 }
 
 fn for_each_damped(
@@ -69,15 +125,17 @@ fn for_each_damped(
     x: &[Vec3],
     mut with: impl FnMut(&Damped<'_>),
 ) {
-    let stretches = &damping.stretches;
     elements.model.for_each_energy(elements.materials, |law, element| {
         let Law { lame, region, is_patch, .. } = *law;
-        let blocks = if is_patch { &stretches.patches } else { &stretches.solid };
-        let (Some(ratio), Some(block)) = (damping.ratios.get(region), blocks.get(element.place[0])) else {
+        let block = damping.stretches.block(is_patch, element.place[0]);
+        let (Some(ratio), Some(block)) = (damping.ratios.get(region).filter(|ratio| **ratio != 0.0), block)
+        else {
             return;
         };
         with(&Damped {
             element,
+            region,
+            is_patch,
             mu: lame.mu,
             lambda: lame.lambda,
             weight: element.volume * ratio,
@@ -124,17 +182,16 @@ impl Damped<'_> {
     }
 }
 
-/// X, symmetric, with `S X + X S = B`: what FᵀF = S² changes of what S changes by B.
-fn by_square(S: &Mat3, B: &Mat3) -> Mat3 {
-    let eigen = S.symmetric_eigen();
-    let (V, s) = (eigen.eigenvectors, eigen.eigenvalues);
-    let within = V.tr_mul(&(B * V));
+/// What is with respect to the stretch S of a deformation gradient F, symmetric, with respect to that: by `FᵀF = S²`.
+fn of_deformation(F: &Mat3, of_stretch: &Mat3) -> Mat3 {
+    let (U, s, V) = signed_svd(F);
+    let within = V.tr_mul(&(of_stretch * V));
     let size = s.amax();
     let scaled = Mat3::from_fn(|i, j| {
         let sum = s[i] + s[j];
-        if sum.abs() > CANCELLED * size { within[(i, j)] / sum } else { 0.0 }
+        if sum.abs() > CANCELLED * size { 2.0 * s[i] * within[(i, j)] / sum } else { 0.0 }
     });
-    V * scaled * V.transpose()
+    U * scaled * V.transpose()
 }
 
 #[cfg(test)]
@@ -192,7 +249,8 @@ mod tests {
                 add_tangents(&elements, &x, false, |_| 1.0, &mut Vec::new(), &mut add);
                 add_damping_tangents(&elements, &damping, &x, &mut Vec::new(), &mut add);
                 let mut by_start = vec![Vec3::zeros(); n];
-                add_damping_by_start(&elements, &damping, [&x, &x_start], &z, &mut by_start);
+                let step = DampedStep { elements: &elements, damping: &damping, h: 1.0, x_start: &x_start, x_end: &x };
+                step.add_by_start(&z, &mut by_start, &mut []);
                 let eps = 1e-6;
                 let along = |x: &[Vec3], k: f64| -> Vec<Vec3> { x.iter().zip(&z).map(|(x, z)| x + z * (k * eps)).collect() };
                 let slope = |[ahead, behind]: [Vec<Vec3>; 2]| -> Vec<Vec3> {

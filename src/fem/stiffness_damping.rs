@@ -47,7 +47,8 @@ impl StiffnessDamping {
     /// Takes the stretches at `x`, or what they and those `before` amount to in a step of the second order; `h` \[s\].
     pub fn begin(&mut self, elements: &Elements<'_>, h: f64, x: &[Vec3], before: Option<&[Vec3]>) {
         let Elements { model, materials, .. } = elements;
-        self.with_materials(materials, h);
+        self.ratios.clear();
+        self.ratios.extend(materials.iter().map(|material| material.stiffness_damping / h));
         self.stretches.clear();
         if self.dampers.is_empty() && self.ratios.iter().all(|ratio| *ratio == 0.0) {
             return;
@@ -65,10 +66,9 @@ impl StiffnessDamping {
         }
     }
 
-    /// Takes other materials, without branches, in the same step of `h` \[s\].
-    pub fn with_materials(&mut self, materials: &[DeformableMaterial], h: f64) {
-        self.ratios.clear();
-        self.ratios.extend(materials.iter().map(|material| material.stiffness_damping / h));
+    /// Those of the dampers at the start of the step.
+    pub fn dampers(&self) -> &Dampers {
+        &self.dampers
     }
 
     /// Whether anything resists.

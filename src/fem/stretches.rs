@@ -6,7 +6,7 @@ use super::regions::Region;
 use crate::energy::membrane::polar_factor;
 use crate::math::lanes::{Lane, LaneMat3};
 use crate::math::polar::polar_rotations;
-use crate::math::{Mat2, Vec3, vectorized};
+use crate::math::{Mat2, Mat3, Vec3, vectorized};
 use std::ops::Range;
 
 /// `S = RᵀF` of each element; empty where nothing asks for them.
@@ -29,6 +29,28 @@ impl Stretches {
         self.patches.clear();
         self.sheets.clear();
         self.lengths.clear();
+    }
+
+    /// As many as of solid elements of a model, all of them zero.
+    pub fn zeros(model: &DeformableModel) -> Self {
+        let zero = LaneMat3(std::array::from_fn(|_| Lane::splat(0.0)));
+        Self {
+            solid: vec![zero; solid_blocks(model)],
+            patches: vec![zero; model.volume_domains.block_count()],
+            ..Self::default()
+        }
+    }
+
+    /// The block of a solid element, of which this is the place.
+    pub fn block(&self, is_patch: bool, place: usize) -> Option<&LaneMat3> {
+        if is_patch { &self.patches } else { &self.solid }.get(place)
+    }
+
+    /// Adds to what is of a solid element.
+    pub fn add(&mut self, is_patch: bool, [block, lane]: [usize; 2], by: &Mat3) {
+        let blocks = if is_patch { &mut self.patches } else { &mut self.solid };
+        let own = &mut blocks[block];
+        own.set_lane(lane, &(own.lane(lane) + by));
     }
 
     /// Takes those at positions `x`.

@@ -1,6 +1,7 @@
 //! What is put right at the end of a body's step, and read off it.
 
 use super::problem::{BodyProblem, Scheme};
+use crate::fem::{Dampers, Elements};
 use crate::math::{
     RigidMotion, Vec3, centre_of_mass, inertia_about, rotation_from_vector, solve_semidefinite,
 };
@@ -200,5 +201,16 @@ impl BodyProblem {
         let inertia =
             (self.pinned_inertia[k] - self.current.x[node]) * (self.masses[node] / (self.h * self.h));
         -(inertia + self.current.r[node] + self.contact_force[node]) - share
+    }
+
+    /// The dampers of the body at the start of the step.
+    pub fn dampers(&self) -> &Dampers {
+        self.damping.dampers()
+    }
+
+    /// Lets the dampers of the body give way by what the step has come to.
+    pub fn give_way(&mut self, dampers: &mut Dampers) {
+        let (model, materials, activations) = (&*self.model, &self.materials, &self.activations);
+        self.damping.end(&Elements { model, materials, activations }, self.dt, &self.current.x, dampers);
     }
 }

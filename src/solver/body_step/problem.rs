@@ -10,7 +10,7 @@ use super::twists::TwistSpring;
 use super::xpbd::XpbdState;
 use crate::body::{Impact, PrescribedNode, SolverSettings};
 use crate::fem::elastic_forces::Evaluation;
-use crate::fem::{Dampers, DeformableModel, Elements, HardLimiting, StiffnessDamping, elastic_forces};
+use crate::fem::{DeformableModel, Elements, HardLimiting, StiffnessDamping, elastic_forces};
 use crate::material::DeformableMaterial;
 use crate::math::{
     Mat3, Vec3, centre_of_mass, inertia_about, rotation_from_vector, skew, solve_without_small,
@@ -171,12 +171,6 @@ impl BodyProblem {
     /// The step \[s\] over which damping acts in the objective.
     pub(super) fn damping_step(&self) -> f64 {
         if self.is_alpha() { self.dt * (1.0 - ALPHA_F) } else { self.h }
-    }
-
-    /// Lets the dampers of the body give way by what the step has come to.
-    pub fn give_way(&mut self, dampers: &mut Dampers) {
-        let (model, materials, activations) = (&*self.model, &self.materials, &self.activations);
-        self.damping.end(&Elements { model, materials, activations }, self.dt, &self.current.x, dampers);
     }
 
     /// Mean velocity of a node in the step [m/s].
