@@ -71,24 +71,13 @@ pub(crate) fn attached_nodes(
     }
 }
 
-/// A node that a rigid body carries.
-#[derive(Clone, Copy)]
-pub(crate) struct CarriedNode {
-    pub body: DeformableBodyHandle,
-    pub node: u32,
-    /// The rigid body.
-    pub by: ProxyId,
-    /// Where that takes it \[m\].
-    pub end: Vec3,
-}
-
-/// Lists the nodes that hard attachments hold to bodies that yield, each with where that body takes it in the step, its turn exact.
+/// Lists the nodes that hard attachments hold to bodies that yield, each with where that body takes it in the step \[m\], its turn exact.
 pub(crate) fn carried_nodes(
     deformables: &DeformableBodySet,
     scene: &mut RapierScene,
     context: &StepContext<'_>,
     reactions: &[Reaction],
-    carried: &mut Vec<CarriedNode>,
+    carried: &mut Vec<(DeformableBodyHandle, u32, Vec3)>,
 ) {
     for (_, attachment) in deformables.attachments().filter(|(_, a)| a.is_hard()) {
         let Anchors::Rigid(rigid, points) = &attachment.anchors else { continue };
@@ -97,10 +86,7 @@ pub(crate) fn carried_nodes(
         let Some(end) = scene.proxies.carries(proxy, reactions, context.h) else { continue };
         let start = Pose64::from_real(body.position());
         let nodes = attachment.nodes.iter().zip(points);
-        carried.extend(nodes.map(|(node, point)| {
-            let end = end(&start.transform(point));
-            CarriedNode { body: attachment.body(), node: *node, by: proxy, end }
-        }));
+        carried.extend(nodes.map(|(node, point)| (attachment.body(), *node, end(&start.transform(point)))));
     }
 }
 

@@ -37,8 +37,7 @@ mod tests;
 
 pub use actuators::{Actuator, ActuatorSignal, DeformableActuators, JointMotorAxis};
 pub(crate) use attachments::{
-    CarriedNode, SteppedBodies, attached_nodes, attachment_constraints, carried_nodes, parted,
-    prescribed_nodes,
+    SteppedBodies, attached_nodes, attachment_constraints, carried_nodes, parted, prescribed_nodes,
 };
 pub(crate) use cables::{cable_constraints, note_cable_force};
 pub(crate) use coefficients::{combine_in_place, combine_in_place_between, combined, combined_between};

@@ -4,7 +4,7 @@
 //! which is what lets an inverted element find its way back.
 
 use super::lanes::{LANES, Lane, LaneMat3, dot3};
-use super::{Mat3, Pose64, Vec3};
+use super::{Mat3, Vec3};
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion};
 
 /// Newton iterations at the most; five suffice from a stretch of ten.
@@ -122,21 +122,6 @@ pub(crate) fn signed_svd(F: &Mat3) -> (Mat3, Vec3, Mat3) {
         sigma[2] = -sigma[2];
     }
     (U, sigma, V)
-}
-
-/// The rigid motion that takes the first points of pairs nearest to the second ones, in the mean of the squares [Horn 1987].
-pub(crate) fn nearest_pose(pairs: impl Iterator<Item = (Vec3, Vec3)> + Clone) -> Pose64 {
-    let (mut from, mut to, mut count) = (Vec3::zeros(), Vec3::zeros(), 0.0);
-    for (a, b) in pairs.clone() {
-        from += a;
-        to += b;
-        count += 1.0;
-    }
-    let [from, to] = [from, to].map(|sum| sum / f64::max(count, 1.0));
-    let mut moment = Mat3::zeros();
-    pairs.for_each(|(a, b)| moment += (b - to) * (a - from).transpose());
-    let rotation = polar_rotation(&moment);
-    Pose64 { rotation, translation: to - rotation * from }
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use crate::solver::acceleration::Accelerator;
 use crate::solver::body_step::{BodyProblem, Factors, NewtonFactors, are_large};
 use crate::solver::cone::ConeTolerance;
 use crate::solver::constraints::{CROWD, Change, ContactSystem, ContactWork, Slack, SolveContext};
-use crate::threads::{for_each_item, for_each_pair};
+use crate::threads::for_each_pair;
 
 /// Bodies whose steps depend on one another.
 #[derive(Default)]
@@ -61,9 +61,6 @@ const BEFORE_SOLVE: Slack = Slack { edges: 0.01, motions: 0.05 };
 const AFTER_SOLVE: Slack = Slack { edges: -1.0e-5, motions: 0.05 };
 /// Part of the contacts that may close after a solve and wait for the next iteration of a crowd.
 const FEW_LATE: f64 = 0.01;
-/// Rounds in which arms are laid anew after the last iteration. Without them a hundredth of the steps of 40 throws around rigid cores ends with arms
-/// 1e-4 to 1e-3 off.
-const ARM_ROUNDS: usize = 8;
 
 impl Island {
     /// Does the iterations of a step of `h` \[s\]; results are in the bodies' `current` and in the
@@ -119,24 +116,6 @@ impl Island {
                     self.contacts.outdate(Change::Frames);
                 }
             }
-        }
-        self.settle_arms(context);
-    }
-
-    /// Lays arms to where the bodies have turned in the last iteration, with contacts solved anew about where that has led. A body of which the guard
-    /// has refused the last step moves next to nothing then: it is damped as much as can be.
-    fn settle_arms(&mut self, context: &SolveContext<'_>) {
-        for _ in 0..ARM_ROUNDS {
-            if !self.contacts.turn_arms(context) {
-                break;
-            }
-            self.bodies.iter_mut().for_each(|body| body.trial.x.clone_from(&body.current.x));
-            self.solve_contacts(false, context);
-            // Not bent: contacts would miss arms by it, and what is left to turn is small.
-            for_each_item(&mut self.bodies, self.is_large, |_, body| {
-                body.evaluate_trial();
-                body.accept_trial();
-            });
         }
     }
 

@@ -1,10 +1,9 @@
 //! What is attached to a rigid body turns with it to the last digit.
 
 use super::scratch::StepScratch;
-use super::work::BodyWork;
 use crate::body::{DeformableBody, DeformableBodySet};
-use crate::coupling::{CarriedNode, StepContext, carried_nodes};
-use crate::math::{Vec3, polar::nearest_pose};
+use crate::coupling::{StepContext, carried_nodes};
+use crate::math::Vec3;
 use crate::solver::{BodyProblem, ContactLimits, Island, Reaction, SolveContext};
 
 /// In mean edges of the surface: what is farther off was put elsewhere by its user, and comes in the next steps.
@@ -19,37 +18,28 @@ const NEGLIGIBLE: f64 = 2e-2;
 /// length.
 const NEGLIGIBLE_WORK: f64 = 1e-6;
 
-/// Attached nodes of a body, those of one rigid body after those of another, and where they are put.
+/// Attached nodes of a body, and where what they are attached to takes them.
 #[derive(Default)]
 pub(super) struct CarriedNodes {
-    nodes: Vec<CarriedNode>,
+    nodes: Vec<(u32, Vec3)>,
     x: Vec<Vec3>,
 }
 
 impl CarriedNodes {
     /// Puts the nodes where they are carried, with the velocities that they have.
     pub fn put(&self, body: &mut DeformableBody) {
-        self.nodes.iter().for_each(|carried| body.state.x[carried.node as usize] = carried.end);
+        self.nodes.iter().for_each(|(node, end)| body.state.x[*node as usize] = *end);
     }
 
     fn are_near(&self, problem: &BodyProblem) -> bool {
         let far = CARRIED * problem.model.surface.mean_edge;
-        self.nodes.iter().all(|node| (problem.current.x[node.node as usize] - node.end).norm() <= far)
-    }
-
-    /// Lets what is carried stay as near as it can to where the solve has left it, and keep its shape.
-    fn stay_near(&mut self, problem: &BodyProblem) {
-        for own in self.nodes.chunk_by_mut(|a, b| a.by == b.by) {
-            let pairs = own.iter().map(|node| (node.end, problem.current.x[node.node as usize]));
-            let nearest = nearest_pose(pairs);
-            own.iter_mut().for_each(|node| node.end = nearest.transform(&node.end));
-        }
+        self.nodes.iter().all(|(node, end)| (problem.current.x[*node as usize] - end).norm() <= far)
     }
 
     /// Energy \[J\] that it takes to put the nodes there.
     fn strain(&mut self, problem: &mut BodyProblem) -> f64 {
         self.x.clone_from(&problem.current.x);
-        self.nodes.iter().for_each(|carried| self.x[carried.node as usize] = carried.end);
+        self.nodes.iter().for_each(|(node, end)| self.x[*node as usize] = *end);
         problem.strain_energy(&self.x, 0.0)
     }
 }
@@ -60,48 +50,11 @@ fn negligible_energy(problem: &mut BodyProblem) -> f64 {
     NEGLIGIBLE * problem.start_energy() + NEGLIGIBLE_WORK * weight * problem.model.surface.mean_edge
 }
 
-/// Whether a body of an island can take nodes where they are carried without making energy; `pays` with that of its velocities.
-fn can_carry(
-    carried: &mut CarriedNodes,
-    island: &mut Island,
-    index: usize,
-    pays: bool,
-    context: &SolveContext<'_>,
-) -> bool {
-    let strain = carried.strain(&mut island.bodies[index]).max(0.0);
-    !island.would_gain_energy(index, strain, context)
-        || strain <= negligible_energy(&mut island.bodies[index])
-        || pays && island.bodies[index].pay(strain)
-}
-
-/// Chooses where the carried nodes of a body of an island are put, if anywhere.
-fn choose_where(work: &mut BodyWork, island: &mut Island, index: usize, context: &SolveContext<'_>) {
-    let carried = &mut work.carried;
-    if carried.nodes.is_empty() {
-        return;
-    }
-    let problem = &island.bodies[index];
-    carried.nodes.retain(|carried| problem.key.pins.binary_search(&carried.node).is_err());
-    let is_solved = island.report.contacts.error <= LEFT_OFF;
-    // What was rejected keeps its shape; what has stopped at an obstacle would be put into it again.
-    let stays = problem.is_rejected || !is_solved && !work.tunnelling.is_empty();
-    if stays || !carried.are_near(problem) {
-        return carried.nodes.clear();
-    }
-    if is_solved && can_carry(carried, island, index, false, context) {
-        return;
-    }
-    carried.stay_near(&island.bodies[index]);
-    if !can_carry(carried, island, index, true, context) {
-        carried.nodes.clear();
-    }
-}
-
 impl StepScratch {
-    /// Finds where rigid bodies take the nodes that are held fast to them. The solve has brought those there but for the turn that the step
-    /// itself has added, and for what is not solved. Where that would take more energy than the body has to spare, they have the rigid
-    /// body's shape where the solve has left them, and come the rest of the way in the next steps: a bar of 1e9 Pa that landed with a core of steel came
-    /// to 5000 times its energy without that, in steps of 1/30 s.
+    /// Finds where rigid bodies take the nodes that are held fast to them. The solve has brought those there but for the turn
+    /// that the step itself has added, and for what is not solved: what that would strain by more energy than the body has
+    /// to spare stays where it is, and comes in the next steps. A bar of 1e9 Pa that landed with a core of steel came to
+    /// 5000 times its energy without that, in steps of 1/30 s.
     pub(super) fn carry_attached(
         &mut self,
         deformables: &DeformableBodySet,
@@ -111,18 +64,31 @@ impl StepScratch {
         self.collect_reactions(context.h);
         self.carried.clear();
         carried_nodes(deformables, &mut self.scene, context, &self.reaction_list, &mut self.carried);
-        self.carried.sort_unstable_by_key(|node| (node.by, node.node));
         self.works.iter_mut().for_each(|work| work.carried.nodes.clear());
-        for own in self.carried.chunk_by(|a, b| a.body == b.body) {
-            if let Some(work) = self.works.iter_mut().find(|work| work.handle == own[0].body) {
-                work.carried.nodes.extend_from_slice(own);
+        for own in self.carried.chunk_by(|a, b| a.0 == b.0) {
+            if let Some(work) = self.works.iter_mut().find(|work| work.handle == own[0].0) {
+                work.carried.nodes.extend(own.iter().map(|(_, node, end)| (*node, *end)));
             }
         }
         let h = context.h;
         let context = SolveContext { factors: &self.factors, proxies: &self.scene.proxies, h, limits };
         for work in &mut self.islands {
             for (local, &index) in work.members.iter().enumerate() {
-                choose_where(&mut self.works[index], &mut work.island, local, &context);
+                let carried = &mut self.works[index].carried;
+                let (problem, error) = (&mut work.island.bodies[local], work.island.report.contacts.error);
+                if carried.nodes.is_empty() {
+                    continue;
+                }
+                // What was rejected keeps its shape.
+                let may = error <= LEFT_OFF && !problem.is_rejected && carried.are_near(problem);
+                let strain = if may { carried.strain(problem).max(0.0) } else { 0.0 };
+                let gains = |island: &mut Island| {
+                    island.would_gain_energy(local, strain, &context)
+                        && strain > negligible_energy(&mut island.bodies[local])
+                };
+                if !may || gains(&mut work.island) {
+                    carried.nodes.clear();
+                }
             }
         }
     }

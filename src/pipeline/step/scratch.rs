@@ -7,7 +7,8 @@ use super::soft_pairs::SoftPairDetection;
 use super::work::{BodyWork, IslandWork};
 use crate::body::{DeformableBodyHandle, DeformableContact, DeformablePairContact, PrescribedNode};
 use crate::contact::{Candidates, Constraint, ProxyId};
-use crate::coupling::{CarriedNode, RapierScene, Reactions, RigidNeighbourhood};
+use crate::coupling::{RapierScene, Reactions, RigidNeighbourhood};
+use crate::math::Vec3;
 use crate::pipeline::{
     DeformableCollisionEvent, DeformableContactForceEvent, DeformableCounters, JointForce, RigidContact,
 };
@@ -39,7 +40,7 @@ pub(in crate::pipeline) struct StepScratch {
     /// Bodies, and what they are attached to and do not collide with.
     pub(super) parted: Vec<(DeformableBodyHandle, ProxyId)>,
     /// Nodes that rigid bodies carry, and to where.
-    pub(super) carried: Vec<CarriedNode>,
+    pub(super) carried: Vec<(DeformableBodyHandle, u32, Vec3)>,
     /// Constraints of attachments and of contacts between deformables.
     pub(super) linking: Vec<Constraint>,
     pub(super) touching: Touching,

@@ -99,11 +99,6 @@ impl TunnellingStops {
         }
     }
 
-    /// Whether nothing has to be stopped.
-    pub fn is_empty(&self) -> bool {
-        self.stops.is_empty()
-    }
-
     /// Stops what was found in a step of `h` \[s\].
     pub fn stop(&self, body: &mut DeformableBody, is_rejected: bool, h: f64) {
         let DeformableState { x, v, .. } = &mut body.state;

@@ -164,21 +164,6 @@ impl BodyProblem {
         true
     }
 
-    /// Lets velocities at the end of the step in contact pay for energy \[J\] that moving nodes elsewhere takes; false if the rigid motion of a
-    /// free body would have to.
-    pub fn pay(&mut self, energy: f64) -> bool {
-        let mut v = std::mem::take(&mut self.force);
-        self.unlimited_velocities(false, &mut v);
-        let bound = self.kinetic_energy(v.iter()).min(self.kinetic_bound) - energy;
-        // Written so that NaN counts as less.
-        let can = bound >= self.rigid_energy(&mut v);
-        self.force = v;
-        if can {
-            self.kinetic_bound = bound;
-        }
-        can
-    }
-
     /// Rejects the step if its bound is less than what momentum asks for.
     pub fn bound_energy(&mut self) {
         let mut v = std::mem::take(&mut self.force);
