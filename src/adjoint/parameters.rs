@@ -9,7 +9,7 @@ use crate::fem::{DeformableModel, Elements, StiffnessDamping};
 use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3, dot};
 
-/// Differences of moduli, relative to Young's, and of activation.
+/// Differences of moduli, relative to Young's, of activation, and of what resists beside branches, relative to itself.
 const DIFFERENCE: f64 = 1.0e-3;
 /// Of Poisson's ratio, relative to its distance from a half: squared the error of the difference, 1e-16 over it that of rounding.
 const POISSON: f64 = 1.0e-5;
@@ -65,8 +65,14 @@ impl ElasticWork<'_> {
     }
 
     /// The same of what resists motion.
-    fn along_damping(&mut self, region: usize, by: f64, set: impl Fn(&mut DeformableMaterial, f64)) -> f64 {
-        self.difference(region, (by, CENTRAL), set, |work, materials| {
+    fn along_damping(
+        &mut self,
+        region: usize,
+        by: f64,
+        scheme: &[(f64, f64)],
+        set: impl Fn(&mut DeformableMaterial, f64),
+    ) -> f64 {
+        self.difference(region, (by, scheme), set, |work, materials| {
             let damping = work.record.damping(work.model, materials);
             work.with(&damping, materials, &work.record.activations)
         })
@@ -121,14 +127,20 @@ impl ElasticWork<'_> {
         let material = self.record.materials[region];
         let beta = material.stiffness_damping;
         if beta != 0.0 {
-            out.stiffness_damping +=
-                self.along_damping(region, DIFFERENCE * beta, |m, d| m.stiffness_damping += d);
+            // Alone it is linear; with branches it has a part of the stretch that they measure from.
+            let (by, scheme) = if self.damping.dampers().is_empty() {
+                (0.5 * beta, LINEAR)
+            } else {
+                (DIFFERENCE * beta, CENTRAL)
+            };
+            out.stiffness_damping += self.along_damping(region, by, scheme, |m, d| m.stiffness_damping += d);
         }
         for (k, branch) in material.maxwell_branches.iter().enumerate().filter(|(_, b)| b.ratio > 0.0) {
             let [ratio, time] = [branch.ratio, branch.time].map(|whole| DIFFERENCE * whole);
             out.maxwell_ratios[k] +=
-                self.along_damping(region, ratio, |m, d| m.maxwell_branches[k].ratio += d);
-            out.maxwell_times[k] += self.along_damping(region, time, |m, d| m.maxwell_branches[k].time += d);
+                self.along_damping(region, ratio, CENTRAL, |m, d| m.maxwell_branches[k].ratio += d);
+            out.maxwell_times[k] +=
+                self.along_damping(region, time, CENTRAL, |m, d| m.maxwell_branches[k].time += d);
         }
     }
 
