@@ -74,6 +74,6 @@ fn main() {
         let rope: Vec<Vector> = (0..=40).map(|k| Vector::X * (k as f32 / 40.0)).collect();
         skin("ball", DeformableBodyBuilder::filled(&Ball::new(0.5), 0.16), ball, 0.45);
         skin("sheet", DeformableBodyBuilder::cloth([0.5; 2], [15, 15], 0.002), sheet, 1.1);
-        skin("tube", DeformableBodyBuilder::rope(&rope, 0.02), tube, 6.0);
+        skin("tube", DeformableBodyBuilder::rope(&rope, 0.02), tube, 2.7);
     });
 }

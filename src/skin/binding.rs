@@ -77,13 +77,22 @@ fn unit(v: Vec3A) -> Vec3A {
     v * (1.0 / v.length().max(f32::MIN_POSITIVE))
 }
 
-/// In single precision.
+/// Of lengths \[m\] and parts: what is less is rounding, and zero. The root of the least normal `f32`, so that a product of two is no
+/// subnormal, which takes a hundred times as long: 10 000 vertices on a rope that falls took 2.3 ms instead of 0.07. At its square
+/// they do again; its root, 3e-10, could be seen.
+const ROUNDING: f64 = 1.1e-19;
+
+/// In single precision, without what would make subnormal products.
 pub(super) fn single(v: &Vec3) -> Vec3A {
-    Vec3A::new(v.x as f32, v.y as f32, v.z as f32)
+    Vec3A::from(singles(v))
 }
 
 fn singles(v: &Vec3) -> [f32; 3] {
-    [v.x, v.y, v.z].map(|c| c as f32)
+    [v.x, v.y, v.z].map(rounded)
+}
+
+fn rounded(c: f64) -> f32 {
+    if c.abs() < ROUNDING { 0.0 } else { c as f32 }
 }
 
 /// To a tetrahedron.
@@ -123,7 +132,7 @@ pub(super) fn bind_to_triangle(
     let normal = normal.try_normalize(0.0).unwrap_or_default();
     let normal = Vec3::new(along.dot(&normal), up.cross(&along).dot(&normal), up.dot(&normal));
     let normal = singles(&normal.map(|c| if c.abs() < f64::from(f32::EPSILON) { 0.0 } else { c }));
-    (away, Binding::Sheet { nodes, weights: weights.map(|w| w as f32), height: height as f32, normal })
+    (away, Binding::Sheet { nodes, weights: weights.map(rounded), height: rounded(height), normal })
 }
 
 /// To a segment of a rod with its rest frame; and how far its axis is \[m\].
@@ -138,9 +147,26 @@ pub(super) fn bind_to_segment(
     let along = (way.dot(&(p - a)) / way.norm_squared()).clamp(0.0, 1.0);
     let away = p - (a + way * along);
     let [u, v, t] = frame;
-    let across = [u.dot(&away) as f32, v.dot(&away) as f32];
+    let across = [rounded(u.dot(&away)), rounded(v.dot(&away))];
     let normal = singles(&Vec3::new(u.dot(normal), v.dot(normal), t.dot(normal)));
     // Caps of a tube stand out beyond its ends.
     let along = along + t.dot(&away) / way.norm();
-    (away.norm(), Binding::Rod { nodes, segment, along: along as f32, across, normal })
+    (away.norm(), Binding::Rod { nodes, segment, along: rounded(along), across, normal })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Nor is NaN made zero, which would hide it.
+        #[test]
+        fn products_of_two_are_never_subnormal(a in -60.0f64..3.0, b in -60.0f64..3.0, sign in prop::sample::select(vec![-1.0, 1.0])) {
+            let (v, w) = (sign * 10f64.powf(a), 10f64.powf(b));
+            let [v32, w32, nan] = single(&Vec3::new(v, w, f64::NAN)).to_array();
+            prop_assert!(!(v32 * w32).is_subnormal() && nan.is_nan());
+            prop_assert!((f64::from(v32) - v).abs() <= 1e-7 * v.abs() + ROUNDING);
+        }
+    }
 }
