@@ -254,6 +254,10 @@ pub fn random_scenes(count: u64, cap: f64, report: &mut Report) {
         if engine == Engine::Foible {
             report.measure(&name, TYPICAL, typical);
             report.measure(&name, EXTREME, scenes[0].0);
+            let counters = scenes.iter().flat_map(|(.., run)| &run.counters);
+            let most = counters.map(|c| c.newton_steps).max().unwrap_or(0);
+            report.measure(&name, NEWTON_STEPS, most as f64);
+            println!("{name}: at most {most} Newton steps in a step");
             // What runs out of its time is slow in every step, whatever the ratio.
             let slow = scenes.iter().skip(5).filter(|(_, seed, _)| cut.contains(seed));
             five()
