@@ -96,6 +96,7 @@ mod touch;
 
 pub use adjoint::{
     CableGradient, DeformableGradient, DeformableLoss, DeformableTape, MaterialGradient, StepGradient,
+    WindGradient,
 };
 pub use body::{
     Acceleration, AttachTo, CablePoint, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
@@ -147,7 +148,7 @@ pub mod prelude {
         Integrator, JointForce, JointMotorAxis, JointRole, MaterialGradient, MaxwellBranch, OrthotropicSheet,
         PhysicsParts, RigidContact, RigidRegion, RigidRegionBody, SolvedJoint, Solver, SolverSettings,
         StepGradient, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix, TactilePad, TactileReading,
-        TetMesh,
+        TetMesh, WindGradient,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

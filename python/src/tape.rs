@@ -6,7 +6,7 @@ use crate::handles::{PyCableHandle, PyColliderHandle, PyDeformableHandle};
 use crate::world::{Inner, World, here, in_turns, step_with};
 use foible3d::{
     CableGradient, DeformableGradient, DeformableLoss, DeformableTape, DeformableWorld, MaterialGradient,
-    StepGradient,
+    StepGradient, WindGradient,
 };
 use numpy::{PyArray1, PyArray3};
 use pyo3::prelude::*;
@@ -296,6 +296,10 @@ impl PyGradient {
         image(py, [self.0.steps.len(), cables.len()], flat)
     }
 
+    fn of_wind<'py>(&self, py: Python<'py>, of: impl Fn(&WindGradient) -> f64) -> Array1<'py> {
+        PyArray1::from_vec(py, self.0.steps.iter().map(|step| of(&step.wind)).collect())
+    }
+
     fn by_region<'py>(&self, py: Python<'py>, of: impl Fn(&MaterialGradient) -> f64) -> Array1<'py> {
         PyArray1::from_vec(py, self.0.materials.iter().map(of).collect())
     }
@@ -397,6 +401,30 @@ impl PyGradient {
     #[getter]
     fn cable_lengths<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
         self.by_cable(py, |of| of.length)
+    }
+
+    /// Per m/s of the air around the body in each step, an array of shape (steps, 3); zero where there was none, as in the next three.
+    #[getter]
+    fn wind_velocity<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
+        rows(py, self.0.steps.iter().map(|step| step.wind.velocity).collect())
+    }
+
+    /// Per kg/m³ of its density in each step, an array of shape (steps,).
+    #[getter]
+    fn wind_density<'py>(&self, py: Python<'py>) -> Array1<'py> {
+        self.of_wind(py, |wind| wind.density)
+    }
+
+    /// Of its drag coefficient in each step, an array of shape (steps,).
+    #[getter]
+    fn wind_drag<'py>(&self, py: Python<'py>) -> Array1<'py> {
+        self.of_wind(py, |wind| wind.drag)
+    }
+
+    /// Of its friction coefficient in each step, an array of shape (steps,).
+    #[getter]
+    fn wind_friction<'py>(&self, py: Python<'py>) -> Array1<'py> {
+        self.of_wind(py, |wind| wind.friction)
     }
 
     fn __repr__(&self) -> String {

@@ -63,6 +63,28 @@ def test_gradients_are_those_of_differences():
     assert "20 steps" in repr(gradient)
 
 
+def test_the_wind_has_gradients():
+    def loss(speed=4.0, drag=1.25):
+        _, body, tape, tip, _ = swing()
+        body.set_wind((1.0, 0.0, speed), density=4.0, drag=drag)
+        tape.step(STEPS)
+        return body.positions[tip, 2], body, tape, tip
+
+    _, body, tape, tip = loss()
+    of_positions = np.zeros((body.vertex_count, 3))
+    of_positions[tip, 2] = 1.0
+    gradient = tape.backward(positions={-1: of_positions})
+    by = 2**-5
+    of_speed = (loss(speed=4.0 + by)[0] - loss(speed=4.0 - by)[0]) / (2 * by)
+    of_drag = (loss(drag=1.25 + by)[0] - loss(drag=1.25 - by)[0]) / (2 * by)
+    assert gradient.wind_velocity.shape == (STEPS, 3)
+    assert gradient.wind_velocity[:, 2].sum() == pytest.approx(of_speed, rel=1e-4) and of_speed > 0.0
+    assert gradient.wind_drag.sum() == pytest.approx(of_drag, rel=1e-4)
+    # Both are of the force's factor.
+    of_densities = gradient.wind_density.sum() * 4.0
+    assert of_densities == pytest.approx(gradient.wind_drag.sum() * 1.25 + gradient.wind_friction.sum() * 0.01, rel=1e-9)
+
+
 def test_contact_forces_have_gradients():
     def force(density):
         _, _, tape, _, collider = swing(density=density, floor=-0.0625, push=0.0, friction=1.0)

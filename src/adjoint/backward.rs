@@ -100,6 +100,8 @@ impl<'a> Backward<'a> {
         self.cables = between.collect();
         out.friction += of.friction;
         add_inertia(record, &inertia, &z, &mut of);
+        let wind = record.wind.as_ref();
+        let wind = wind.map(|wind| wind.back(model, record, &inertia.masses, &mut of)).unwrap_or_default();
         if damping.resists() {
             damped.add_by_start(&z, &mut of.x_start, &mut self.dampers);
         }
@@ -117,6 +119,7 @@ impl<'a> Backward<'a> {
             pressures: of_pressures(&self.tangent.rooms, model.cavities.len(), &z),
             rolls: of_rolls(model, record, &z),
             cables: record.cables.iter().zip(&cables).map(cable_gradient).collect(),
+            wind,
             velocities: users(&of.v_start),
         });
         (self.x, self.v) = (of.x_start, of.v_start);

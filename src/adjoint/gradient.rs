@@ -39,6 +39,20 @@ pub struct CableGradient {
     pub length: f64,
 }
 
+/// Derivatives of a loss with respect to the wind around a body.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct WindGradient {
+    /// Per m/s of the air.
+    pub velocity: [f64; 3],
+    /// Per kg/m³ of its density.
+    pub density: f64,
+    /// Of the drag coefficient.
+    pub drag: f64,
+    /// Of the friction coefficient.
+    pub friction: f64,
+}
+
 /// Derivatives of a loss with respect to what acted on a body in one step.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -57,6 +71,8 @@ pub struct StepGradient {
     pub rolls: Vec<f64>,
     /// Of the cables through the body, oldest first.
     pub cables: Vec<CableGradient>,
+    /// Of the wind; zero where there is none.
+    pub wind: WindGradient,
     /// Per m/s that each vertex would have gained before the step.
     pub velocities: Vec<[f64; 3]>,
 }
@@ -110,6 +126,16 @@ impl DeformableGradient {
     /// Per radian more of roll of each rod in all steps.
     pub fn rolls(&self) -> Vec<f64> {
         self.columns(|step| &step.rolls)
+    }
+
+    /// Of a wind that was the same in all steps.
+    pub fn wind(&self) -> WindGradient {
+        self.steps.iter().fold(WindGradient::default(), |sum, StepGradient { wind, .. }| WindGradient {
+            velocity: added(&sum.velocity, &wind.velocity),
+            density: sum.density + wind.density,
+            drag: sum.drag + wind.drag,
+            friction: sum.friction + wind.friction,
+        })
     }
 
     /// Of a tension or a length of a cable that was the same in all steps.

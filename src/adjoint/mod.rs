@@ -18,7 +18,8 @@ mod tangent;
 mod backward;
 
 mod tape;
+mod wind;
 
-pub use gradient::{CableGradient, DeformableGradient, MaterialGradient, StepGradient};
+pub use gradient::{CableGradient, DeformableGradient, MaterialGradient, StepGradient, WindGradient};
 pub use loss::DeformableLoss;
 pub use tape::DeformableTape;

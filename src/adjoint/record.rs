@@ -2,7 +2,8 @@
 
 use super::cables::CableRecord;
 use super::held_twists::TwistRecord;
-use crate::body::{ConstraintKey, DeformableBody, HeldTwist, Integrator, Solver};
+use super::wind::WindRecord;
+use crate::body::{ConstraintKey, DeformableBody, DeformableWind, HeldTwist, Integrator, Solver};
 use crate::contact::{Endpoint, Law};
 use crate::energy::CavityFilling;
 use crate::fem::{Dampers, DeformableModel, Elements, StiffnessDamping};
@@ -45,8 +46,9 @@ pub(super) struct StepRecord {
     /// Of the world [m/s²], and the body's factor on it.
     pub gravity: Vec3,
     pub gravity_scale: f64,
-    /// On the nodes \[N\]; empty while there are none.
+    /// On the nodes \[N\], those of the wind too; empty while there are none.
     pub forces: Vec<Vec3>,
+    pub wind: Option<WindRecord>,
     pub contacts: Vec<ContactRecord>,
     pub cables: Vec<CableRecord>,
     /// What the step has lost of the angular momentum was given back.
@@ -95,6 +97,8 @@ impl StepRecord {
         if !keeps_spin && !is_mean {
             return Err("spin was given back in contact: it has to be without `keeps_spin`");
         }
+        let push = |wind: DeformableWind| wind.push(&body.model, &problem.x_start, &problem.v_start);
+        let wind = body.wind().map(|wind| WindRecord { wind, push: push(wind) });
         Ok(Self {
             h: problem.h(),
             pins: problem.key.pins.clone(),
@@ -108,7 +112,8 @@ impl StepRecord {
             twists: body.state.twists.iter().map(twist_record).collect(),
             gravity,
             gravity_scale: body.gravity_scale(),
-            forces: body.forces.clone(),
+            forces: forces(body, wind.as_ref(), problem.h()),
+            wind,
             contacts,
             cables,
             keeps_spin,
@@ -136,6 +141,17 @@ fn twist_record(held: &HeldTwist) -> TwistRecord {
     TwistRecord { rod: held.rod as usize, frames: held.frames(), twist: held.roll + held.angle }
 }
 
+/// On the nodes, by the user and by the wind.
+fn forces(body: &DeformableBody, wind: Option<&WindRecord>, h: f64) -> Vec<Vec3> {
+    let mut forces = body.forces.clone();
+    if let Some(wind) = wind {
+        forces.resize(body.state.x.len(), Vec3::zeros());
+        let nodes = forces.iter_mut().enumerate();
+        nodes.for_each(|(n, force)| *force += wind.force(n, body.node_mass(n), h));
+    }
+    forces
+}
+
 fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
     let why = [
         (body.is_sleeping(), "the body sleeps: it has to be without `can_sleep`"),
@@ -147,7 +163,6 @@ fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
             "stiffness damping and Maxwell branches of sheets, rods, springs and fibres have none",
         ),
         (body.materials.iter().any(|m| m.orthotropic.is_some()), "woven sheets have none"),
-        (body.wind().is_some(), "wind has none"),
     ];
     why.iter().find(|(is_so, _)| *is_so).map_or(Ok(()), |(_, what)| Err(*what))
 }
@@ -247,6 +262,7 @@ impl StepRecord {
             gravity: Vec3::zeros(),
             gravity_scale: 1.0,
             forces: Vec::new(),
+            wind: None,
             contacts: Vec::new(),
             cables: Vec::new(),
             keeps_spin: false,

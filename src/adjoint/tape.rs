@@ -22,7 +22,7 @@ use std::sync::Arc;
 const ELSEWHERE: f64 = 1.0e-6;
 
 /// Steps of one body, recorded so that derivatives of a loss with respect to what the body is made of, how it began and what acted on it
-/// can be had: exact ones of the converged steps, for one solve a step. What its user changes between steps (forces, pins,
+/// can be had: exact ones of the converged steps, for one solve a step. What its user changes between steps (forces, pins, wind,
 /// activation, impulses, what draws cables) takes part; what moves or speeds vertices up counts as added to what was there.
 ///
 /// Steps have to be solved far: a [`tolerance`](crate::SolverSettings::tolerance) of 1e-10 or less, as that of

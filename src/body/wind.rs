@@ -2,6 +2,7 @@
 
 use super::body::{DeformableBody, finite};
 use crate::error::BodyError;
+use crate::fem::DeformableModel;
 use crate::math::{Vec3, from_real};
 use rapier3d::math::Vector;
 
@@ -61,53 +62,85 @@ impl DeformableBody {
     /// Adds the accelerations [m/s²] that the wind gives to nodes in a step of `h` \[s\].
     pub(crate) fn add_wind(&self, h: f64, accelerations: &mut [Vec3]) {
         let Some(wind) = self.wind.as_ref() else { return };
-        let surface = &self.model.surface;
-        let (x, v) = (&self.state.x, &self.state.v);
-        // Force per speed at each node [kg/s].
-        let mut coefficients = vec![0.0; x.len()];
-        let mut forces = vec![Vec3::zeros(); x.len()];
-        let mut push = |nodes: &[u32], force: Vec3, coefficient: f64| {
-            let share = 1.0 / nodes.len() as f64;
-            for &n in nodes {
-                forces[n as usize] += force * share;
-                coefficients[n as usize] += coefficient * share;
-            }
-        };
-        let air = from_real(wind.velocity);
-        let mean = |nodes: &[u32]| nodes.iter().map(|&n| v[n as usize]).sum::<Vec3>() / nodes.len() as f64;
-        let half = 0.5 * wind.density.max(0.0);
-        let (drag, friction) = (half * wind.drag.max(0.0), half * wind.friction.max(0.0));
+        let push = wind.push(&self.model, &self.state.x, &self.state.v);
+        for (n, acceleration) in accelerations.iter_mut().enumerate() {
+            *acceleration += push.forces[n] / push.divisor(n, self.node_mass(n), h);
+        }
+    }
+}
+
+/// What the wind does to nodes.
+#[derive(Clone, Debug)]
+pub(crate) struct Push {
+    /// \[N\].
+    pub forces: Vec<Vec3>,
+    /// Force per speed [kg/s].
+    pub coefficients: Vec<f64>,
+}
+
+impl Push {
+    fn add(&mut self, nodes: &[u32], force: Vec3, coefficient: f64) {
+        let share = 1.0 / nodes.len() as f64;
+        for &n in nodes {
+            self.forces[n as usize] += force * share;
+            self.coefficients[n as usize] += coefficient * share;
+        }
+    }
+
+    /// What the force on a node is divided by: what is light takes the speed of the air at the most, and not that of the other way.
+    pub fn divisor(&self, node: usize, mass: f64, h: f64) -> f64 {
+        mass.max(h * self.coefficients[node])
+    }
+}
+
+impl DeformableWind {
+    /// Force per area and squared speed across a plate and along it [kg/m³].
+    pub(crate) fn pressures(&self) -> [f64; 2] {
+        [self.drag, self.friction].map(|c| 0.5 * self.density.max(0.0) * c.max(0.0))
+    }
+
+    /// What it does to nodes at x \[m\] of velocities v [m/s].
+    pub(crate) fn push(&self, model: &DeformableModel, x: &[Vec3], v: &[Vec3]) -> Push {
+        let surface = &model.surface;
+        let mut push = Push { forces: vec![Vec3::zeros(); x.len()], coefficients: vec![0.0; x.len()] };
+        let air = from_real(self.velocity);
+        let [drag, friction] = self.pressures();
         for (t, nodes) in surface.triangles.iter().enumerate() {
             let [a, b, c] = nodes.map(|n| x[n as usize]);
             let across = (b - a).cross(&(c - a));
             let length = across.norm();
-            let through = air - mean(nodes);
+            let through = air - mean(nodes, v);
             let along_normal = if length > 0.0 { through.dot(&across) / length } else { continue };
             let normal = across * (along_normal / length);
             let slip = through - normal;
-            // Behind a solid there is no wind.
-            let faces = t >= surface.closed || along_normal < 0.0;
-            let drag = if faces { drag * along_normal.abs() } else { 0.0 };
+            let drag = if faces(surface.closed, t, along_normal) { drag * along_normal.abs() } else { 0.0 };
             let [k, l] = [drag, friction * slip.norm()].map(|k| k * 0.5 * length);
-            push(nodes, normal * k + slip * l, k.max(l));
+            push.add(nodes, normal * k + slip * l, k.max(l));
         }
         for edge in surface.segments.iter().map(|&e| surface.edges[e as usize]) {
             let [a, b] = edge.map(|n| n as usize);
             let along = x[b] - x[a];
             let length = along.norm();
-            let through = air - mean(&edge);
+            let through = air - mean(&edge, v);
             let across = if length > 0.0 {
                 through - along * (along.dot(&through) / (length * length))
             } else {
                 continue;
             };
-            let diameter = self.model.half_thickness[a] + self.model.half_thickness[b];
+            let diameter = model.half_thickness[a] + model.half_thickness[b];
             let coefficient = drag * across.norm() * length * diameter;
-            push(&edge, across * coefficient, coefficient);
+            push.add(&edge, across * coefficient, coefficient);
         }
-        // What is light takes the speed of the air at the most, and not that of the other way.
-        for (n, acceleration) in accelerations.iter_mut().enumerate() {
-            *acceleration += forces[n] / self.node_mass(n).max(h * coefficients[n]);
-        }
+        push
     }
+}
+
+/// Whether the wind through a triangle pushes it: behind a solid, whose triangles are the first, there is none.
+pub(crate) fn faces(closed: usize, triangle: usize, along_normal: f64) -> bool {
+    triangle >= closed || along_normal < 0.0
+}
+
+/// Of vectors at nodes.
+pub(crate) fn mean(nodes: &[u32], of: &[Vec3]) -> Vec3 {
+    nodes.iter().map(|&n| of[n as usize]).sum::<Vec3>() / nodes.len() as f64
 }

@@ -25,6 +25,8 @@ pub struct Run {
     pub roll: Option<f64>,
     /// What draws the cable.
     pub pull: Option<Pull>,
+    /// The air around the body: velocity [m/s], density [kg/m³], drag and friction coefficient.
+    pub wind: Option<([f64; 3], [f64; 3])>,
     /// Of the floor; none if there is no friction.
     pub friction: f64,
 }
@@ -43,6 +45,7 @@ impl Run {
             filling: None,
             roll: None,
             pull: None,
+            wind: None,
             friction: 0.0,
         }
     }
@@ -178,6 +181,10 @@ impl Scene {
         }
         body.add_force(&[tip], Vector::Z * run.push as f32).unwrap();
         body.set_activation(run.activation).unwrap();
+        if let Some((velocity, [density, drag, friction])) = run.wind {
+            let velocity = Vector::from(velocity.map(|v| v as f32));
+            body.set_wind(Some(DeformableWind { velocity, density, drag, friction })).unwrap();
+        }
         if run.filling.is_some() {
             body.fill_cavity(0, run.filling).unwrap();
         }
