@@ -25,8 +25,8 @@ pub struct Run {
     pub roll: Option<f64>,
     /// What draws the cable.
     pub pull: Option<Pull>,
-    /// The air around the body: velocity [m/s], density [kg/m³], drag and friction coefficient.
-    pub wind: Option<([f64; 3], [f64; 3])>,
+    /// The air around the body.
+    pub wind: Option<DeformableWind>,
     /// Of the floor; none if there is no friction.
     pub friction: f64,
 }
@@ -181,13 +181,8 @@ impl Scene {
         }
         body.add_force(&[tip], Vector::Z * run.push as f32).unwrap();
         body.set_activation(run.activation).unwrap();
-        if let Some((velocity, [density, drag, friction])) = run.wind {
-            let velocity = Vector::from(velocity.map(|v| v as f32));
-            body.set_wind(Some(DeformableWind { velocity, density, drag, friction })).unwrap();
-        }
-        if run.filling.is_some() {
-            body.fill_cavity(0, run.filling).unwrap();
-        }
+        body.set_wind(run.wind).unwrap();
+        run.filling.iter().for_each(|filling| body.fill_cavity(0, Some(*filling)).unwrap());
         for vertex in body.pinned().collect::<Vec<_>>() {
             body.set_velocity(vertex, Vector::ZERO).unwrap();
             body.set_pin_velocity(vertex, Vector::Z * run.lead as f32).unwrap();
@@ -216,10 +211,8 @@ impl Scene {
         let (mut loss, mut seeds) = (0.0, tape.loss());
         for (step, states) in losses {
             for (vertex, (x, v)) in states.into_iter().enumerate() {
-                let (a, b) = (
-                    [0, 1, 2].map(|k| weight(3 * vertex + k)),
-                    [0, 1, 2].map(|k| 0.02 * weight(5 * vertex + k)),
-                );
+                let a = [0, 1, 2].map(|k| weight(3 * vertex + k));
+                let b = [0, 1, 2].map(|k| 0.02 * weight(5 * vertex + k));
                 // Squares too: derivatives that depend on where it is.
                 loss += (0..3).map(|k| a[k] * x[k] + 0.5 * x[k] * x[k] + b[k] * v[k]).sum::<f64>();
                 seeds.add_position(step, vertex, [0, 1, 2].map(|k| a[k] + x[k])).unwrap();

@@ -41,8 +41,6 @@ pub(crate) struct ContactSystem {
     pub(super) free: FreeSolve,
     pub work: ContactWork,
     pub(super) spent: Spent,
-    /// Whether the step has no iteration after this one, which could do what a solve leaves.
-    pub is_last: bool,
     /// Energy that undoing overlaps may still make, by bodies \[J\].
     pub(super) may_make: Vec<f64>,
 }
