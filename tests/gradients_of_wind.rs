@@ -190,3 +190,21 @@ fn winds_that_are_set_anew_have_gradients_step_by_step() {
     assert_eq!(gradient.steps[0].wind, WindGradient::default());
     assert!(gradient.steps[1].wind.velocity[1] != 0.0);
 }
+
+#[test]
+fn coefficients_below_zero_count_as_zero_backward_too() {
+    let scene = Scene::new(flag(1.0 / 128.0).pinned(|x| x.x < -0.2499));
+    let of = |change: fn(&mut DeformableWind)| {
+        let mut run = Run { wind: air(AIR, 1.25, 0.25), ..Run::of(DeformableMaterial::new(1.0e5, 0.3)) };
+        change(run.wind.as_mut().unwrap());
+        let out = scene.run(&run);
+        out.tape.backward(&out.seeds).unwrap().wind()
+    };
+    let (none, negative) = (of(|wind| wind.drag = 0.0), of(|wind| wind.drag = -2.0));
+    assert!(none.drag != 0.0 && negative.drag == 0.0);
+    assert!(none.friction != 0.0 && negative.friction == none.friction);
+    assert!(none.density != 0.0 && negative.density == none.density);
+    // No air at all.
+    let vacuum = of(|wind| wind.density = -1.0);
+    assert_eq!([vacuum.density, vacuum.drag, vacuum.friction], [0.0; 3]);
+}

@@ -11,7 +11,7 @@ pub struct MaterialGradient {
     pub youngs_modulus: f64,
     /// Of Poisson's ratio.
     pub poisson_ratio: f64,
-    /// Per kg/m³ of density, with forces as they are.
+    /// Per kg/m³ of density, with the user's forces as they are.
     pub density: f64,
     /// Per 1/s of mass damping α.
     pub mass_damping: f64,
@@ -39,7 +39,7 @@ pub struct CableGradient {
     pub length: f64,
 }
 
-/// Derivatives of a loss with respect to the wind around a body.
+/// Derivatives of a loss with respect to the wind around a body; zero by what is below zero and counts as zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct WindGradient {

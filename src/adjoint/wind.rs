@@ -7,9 +7,9 @@
 use super::gradient::WindGradient;
 use super::record::StepRecord;
 use super::spin::Cotangents;
-use crate::body::{DeformableWind, Push, faces, mean};
+use crate::body::{DeformableWind, Panel, Push, is_pushed, panels};
 use crate::fem::DeformableModel;
-use crate::math::{Vec3, from_real};
+use crate::math::Vec3;
 
 /// The wind of a step.
 #[derive(Clone, Debug)]
@@ -47,20 +47,25 @@ impl WindRecord {
         masses: &[f64],
         of: &mut Cotangents,
     ) -> WindGradient {
-        let (x, v) = (&record.x_start, &record.v_start);
         let asked = self.asked(record.h, masses, of);
-        let ask = |nodes: &[u32]| {
-            let share = 1.0 / nodes.len() as f64;
-            let sum = nodes.iter().fold((Vec3::zeros(), 0.0), |(u, k), &n| {
-                let own = &asked[n as usize];
-                (u + own.along, k + own.per_coefficient)
-            });
-            Asked { along: sum.0 * share, per_coefficient: sum.1 * share }
-        };
-        let air = from_real(self.wind.velocity);
+        let [drag, friction] = self.wind.pressures();
         let (mut of_air, mut of_pressures) = (Vec3::zeros(), [0.0; 2]);
-        let mut add = |nodes: &[u32], answer: Answer| {
+        for panel in panels(model, &record.x_start) {
+            let through = self.wind.through(&panel, &record.v_start);
+            let nodes = panel.nodes();
             let share = 1.0 / nodes.len() as f64;
+            let all = nodes.iter().map(|&n| asked[n as usize]);
+            let ask = Asked {
+                along: all.clone().map(|own| own.along).sum::<Vec3>() * share,
+                per_coefficient: all.map(|own| own.per_coefficient).sum::<f64>() * share,
+            };
+            let answer = match panel {
+                Panel::Plate { edges, is_solid, .. } => {
+                    plate(edges, through, [drag, friction], |s| is_pushed(is_solid, s), ask)
+                }
+                Panel::Segment { edge, diameter, .. } => segment(edge, through, drag, diameter, ask),
+            };
+            let Some(answer) = answer else { continue };
             of_air += answer.through;
             nodes.iter().for_each(|&n| of.v_start[n as usize] -= answer.through * share);
             for (&n, edge) in nodes[1..].iter().zip(answer.edges) {
@@ -68,30 +73,20 @@ impl WindRecord {
                 of.x_start[nodes[0] as usize] -= edge;
             }
             of_pressures.iter_mut().zip(answer.coefficients).for_each(|(sum, own)| *sum += own);
-        };
-        let surface = &model.surface;
-        let [drag, friction] = self.wind.pressures();
-        for (t, nodes) in surface.triangles.iter().enumerate() {
-            let [a, b, c] = nodes.map(|n| x[n as usize]);
-            let through = air - mean(nodes, v);
-            let is_pushed = |along_normal| faces(surface.closed, t, along_normal);
-            if let Some(answer) = plate([b - a, c - a], through, [drag, friction], is_pushed, ask(nodes)) {
-                add(nodes, answer);
-            }
         }
-        for edge in surface.segments.iter().map(|&e| surface.edges[e as usize]) {
-            let [a, b] = edge.map(|n| n as usize);
-            let diameter = model.half_thickness[a] + model.half_thickness[b];
-            if let Some(answer) = segment(x[b] - x[a], air - mean(&edge, v), drag, diameter, ask(&edge)) {
-                add(&edge, answer);
-            }
-        }
-        let half_density = 0.5 * self.wind.density;
+        self.gradient(of_air, of_pressures)
+    }
+
+    /// What those with respect to [`DeformableWind::pressures`] say of what these are of; what is below zero counts as zero.
+    fn gradient(&self, of_air: Vec3, [of_drag, of_friction]: [f64; 2]) -> WindGradient {
+        let wind = &self.wind;
+        let [density, drag, friction] = [wind.density, wind.drag, wind.friction].map(|c| c.max(0.0));
+        let unless_negative = |c: f64, of: f64| if c < 0.0 { 0.0 } else { 0.5 * of };
         WindGradient {
             velocity: of_air.into(),
-            density: 0.5 * (self.wind.drag * of_pressures[0] + self.wind.friction * of_pressures[1]),
-            drag: half_density * of_pressures[0],
-            friction: half_density * of_pressures[1],
+            density: unless_negative(wind.density, drag * of_drag + friction * of_friction),
+            drag: unless_negative(wind.drag, density * of_drag),
+            friction: unless_negative(wind.friction, density * of_friction),
         }
     }
 
@@ -137,7 +132,7 @@ fn plate(
     let of_normal =
         (through * of_s) + u * (drag * s.abs() * s) - through * normal.dot(&of_slip) - of_slip * s;
     let flat = |v: &Vec3| v - normal * normal.dot(v);
-    let of_area = drag * s.abs() * (s * u.dot(&normal) + k) + friction * per_friction;
+    let of_area = drag * per_drag + friction * per_friction;
     let of_across = (normal * of_area + flat(&of_normal)) * 0.5;
     Some(Answer {
         through: (normal * of_s + flat(&of_slip)) * area,

@@ -71,4 +71,4 @@ pub use stress::DeformableStress;
 pub(crate) use touching::TouchKey;
 pub(crate) use twist::{HeldEnd, HeldTwist};
 pub use wind::DeformableWind;
-pub(crate) use wind::{Push, faces, mean};
+pub(crate) use wind::{Panel, Push, is_pushed, panels};

@@ -101,46 +101,79 @@ impl DeformableWind {
 
     /// What it does to nodes at x \[m\] of velocities v [m/s].
     pub(crate) fn push(&self, model: &DeformableModel, x: &[Vec3], v: &[Vec3]) -> Push {
-        let surface = &model.surface;
         let mut push = Push { forces: vec![Vec3::zeros(); x.len()], coefficients: vec![0.0; x.len()] };
-        let air = from_real(self.velocity);
         let [drag, friction] = self.pressures();
-        for (t, nodes) in surface.triangles.iter().enumerate() {
-            let [a, b, c] = nodes.map(|n| x[n as usize]);
-            let across = (b - a).cross(&(c - a));
-            let length = across.norm();
-            let through = air - mean(nodes, v);
-            let along_normal = if length > 0.0 { through.dot(&across) / length } else { continue };
-            let normal = across * (along_normal / length);
-            let slip = through - normal;
-            let drag = if faces(surface.closed, t, along_normal) { drag * along_normal.abs() } else { 0.0 };
-            let [k, l] = [drag, friction * slip.norm()].map(|k| k * 0.5 * length);
-            push.add(nodes, normal * k + slip * l, k.max(l));
-        }
-        for edge in surface.segments.iter().map(|&e| surface.edges[e as usize]) {
-            let [a, b] = edge.map(|n| n as usize);
-            let along = x[b] - x[a];
-            let length = along.norm();
-            let through = air - mean(&edge, v);
-            let across = if length > 0.0 {
-                through - along * (along.dot(&through) / (length * length))
-            } else {
-                continue;
-            };
-            let diameter = model.half_thickness[a] + model.half_thickness[b];
-            let coefficient = drag * across.norm() * length * diameter;
-            push.add(&edge, across * coefficient, coefficient);
+        for panel in panels(model, x) {
+            let through = self.through(&panel, v);
+            match panel {
+                Panel::Plate { nodes, edges: [b, c], is_solid } => {
+                    let across = b.cross(&c);
+                    let length = across.norm();
+                    let along_normal = if length > 0.0 { through.dot(&across) / length } else { continue };
+                    let normal = across * (along_normal / length);
+                    let slip = through - normal;
+                    let drag =
+                        if is_pushed(is_solid, along_normal) { drag * along_normal.abs() } else { 0.0 };
+                    let [k, l] = [drag, friction * slip.norm()].map(|k| k * 0.5 * length);
+                    push.add(&nodes, normal * k + slip * l, k.max(l));
+                }
+                Panel::Segment { nodes, edge, diameter } => {
+                    let length = edge.norm();
+                    let across = if length > 0.0 {
+                        through - edge * (edge.dot(&through) / (length * length))
+                    } else {
+                        continue;
+                    };
+                    let coefficient = drag * across.norm() * length * diameter;
+                    push.add(&nodes, across * coefficient, coefficient);
+                }
+            }
         }
         push
     }
+
+    /// Velocity of the air through a panel, whose nodes have velocities v [m/s].
+    pub(crate) fn through(&self, panel: &Panel, v: &[Vec3]) -> Vec3 {
+        let nodes = panel.nodes();
+        let mean = nodes.iter().map(|&n| v[n as usize]).sum::<Vec3>() / nodes.len() as f64;
+        from_real(self.velocity) - mean
+    }
 }
 
-/// Whether the wind through a triangle pushes it: behind a solid, whose triangles are the first, there is none.
-pub(crate) fn faces(closed: usize, triangle: usize, along_normal: f64) -> bool {
-    triangle >= closed || along_normal < 0.0
+/// What the wind meets.
+pub(crate) enum Panel {
+    /// A triangle, by its edges from the first node \[m\].
+    Plate { nodes: [u32; 3], edges: [Vec3; 2], is_solid: bool },
+    /// Of a rod.
+    Segment { nodes: [u32; 2], edge: Vec3, diameter: f64 },
 }
 
-/// Of vectors at nodes.
-pub(crate) fn mean(nodes: &[u32], of: &[Vec3]) -> Vec3 {
-    nodes.iter().map(|&n| of[n as usize]).sum::<Vec3>() / nodes.len() as f64
+impl Panel {
+    pub fn nodes(&self) -> &[u32] {
+        match self {
+            Self::Plate { nodes, .. } => nodes,
+            Self::Segment { nodes, .. } => nodes,
+        }
+    }
+}
+
+/// All that the wind meets of a body with its nodes at x \[m\].
+pub(crate) fn panels<'a>(model: &'a DeformableModel, x: &'a [Vec3]) -> impl Iterator<Item = Panel> + 'a {
+    let surface = &model.surface;
+    let plates = surface.triangles.iter().enumerate().map(|(t, &nodes)| {
+        let [a, b, c] = nodes.map(|n| x[n as usize]);
+        Panel::Plate { nodes, edges: [b - a, c - a], is_solid: t < surface.closed }
+    });
+    let segments = surface.segments.iter().map(|&e| {
+        let nodes = surface.edges[e as usize];
+        let [a, b] = nodes.map(|n| n as usize);
+        let diameter = model.half_thickness[a] + model.half_thickness[b];
+        Panel::Segment { nodes, edge: x[b] - x[a], diameter }
+    });
+    plates.chain(segments)
+}
+
+/// Whether the wind through a plate pushes it: behind a solid there is none.
+pub(crate) fn is_pushed(is_solid: bool, along_normal: f64) -> bool {
+    !is_solid || along_normal < 0.0
 }
