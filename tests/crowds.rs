@@ -133,6 +133,7 @@ fn driven(e: f64, z: f32) -> (f64, f64) {
         if step > 42 {
             gain = gain.max((now - before) / before);
         }
+        assert!(now.is_finite());
         (before, low) = (now, low.min(lowest(&world)));
     }
     (gain, low)

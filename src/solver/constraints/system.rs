@@ -56,8 +56,10 @@ pub(super) struct Spent {
     pub operations: usize,
     /// Newton's method from the forces as they were.
     pub failures: usize,
-    /// Whether the forces are still those of the shifts before the last.
+    /// Whether the second solve failed and waits for the next iteration: the forces are those of the shifts before.
     pub are_shifts_behind: bool,
+    /// How often that was so.
+    pub waits: usize,
 }
 
 /// Newton's method and sweeps, with the Delassus operator as a matrix.
