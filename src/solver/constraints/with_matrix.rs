@@ -15,7 +15,7 @@ use crate::threads::for_each_item;
 /// one, and the only iteration of cheap presets makes energy on hilly floors.
 const SHIFT_ROUNDS: usize = 2;
 /// Ratio of masses from which on the second may always go on by continuation. Without that, a cube of ν = 0.49 on which a thousand times its
-/// mass is set down has a step rejected. Measured at 1, 70 and 1000 only.
+/// mass is set down has a step rejected. Measured at 1, 70 and 1000 only; links of multibodies do not count.
 const HEAVY: f64 = 100.0;
 /// Second solves of a step that may wait for the next iteration: no step goes on for them for ever.
 const WAITS: usize = 20;
