@@ -133,7 +133,7 @@ pub struct DeformableCounters {
     pub contact_error: f64,
     /// Dense factorizations of the contact problems.
     pub contact_factorizations: usize,
-    /// Contact problems that Newton's method did not solve, but for second ones of an iteration that the next one does again.
+    /// Contact problems that Newton's method did not solve.
     pub contact_failures: usize,
     /// Sparse factorizations.
     pub factorizations: usize,

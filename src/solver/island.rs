@@ -93,8 +93,7 @@ impl Island {
         let iterations = self.bodies.iter().map(|b| b.settings.max_iterations).max().unwrap_or(0);
         for iteration in 1..=iterations {
             self.report.iterations += 1;
-            self.contacts.is_last = iteration == iterations;
-            let may_wait = !self.contacts.is_last && self.bodies.len() >= CROWD;
+            let may_wait = iteration < iterations && self.bodies.len() >= CROWD;
             let outcome = self.iterate(may_wait, context);
             if !self.contacts.is_empty() {
                 self.bodies.iter_mut().for_each(BodyProblem::update_steady);

@@ -89,7 +89,6 @@ impl Island {
         }
         if solves {
             self.contacts.outdate(Change::Contacts);
-            self.contacts.is_last = true;
             self.solve_contacts(false, context);
         }
         let mut turned = false;

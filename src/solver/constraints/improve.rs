@@ -15,7 +15,7 @@ use crate::solver::cone::{ConeTolerance, Effort};
 /// iteration. Towers of fewer carry rigid loads, which sweeps do not.
 pub(crate) const CROWD: usize = 6;
 /// Operations of a small island's factorizations in a step, at the most, before sweeps take over: a millisecond or two.
-pub(super) const LIGHT_WORK: usize = 20_000_000;
+const LIGHT_WORK: usize = 20_000_000;
 /// The same of what is still, or overlaps after sweeps.
 const STILL_WORK: [usize; 2] = [100_000_000, 1_000_000_000];
 /// So many solves, between those bounds.
@@ -86,7 +86,6 @@ impl ContactSystem {
 
     fn improve_within_bounds(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) -> bool {
         let Around { factors, context, tolerance } = around;
-        self.spent.are_shifts_behind = false;
         self.measure(bodies, context);
         let is_small = bodies.len() < CROWD;
         let has_columns = bodies.iter().enumerate().all(|(i, b)| factors.has_columns(i, b));

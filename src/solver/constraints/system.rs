@@ -41,8 +41,6 @@ pub(crate) struct ContactSystem {
     pub(super) free: FreeSolve,
     pub work: ContactWork,
     pub(super) spent: Spent,
-    /// Whether the step has no iteration after this one, which could do what a solve leaves.
-    pub is_last: bool,
     /// Energy that undoing overlaps may still make, by bodies \[J\].
     pub(super) may_make: Vec<f64>,
 }
@@ -56,10 +54,6 @@ pub(super) struct Spent {
     pub operations: usize,
     /// Newton's method from the forces as they were.
     pub failures: usize,
-    /// Whether the second solve failed and waits for the next iteration: the forces are those of the shifts before.
-    pub are_shifts_behind: bool,
-    /// How often that was so.
-    pub waits: usize,
 }
 
 /// Newton's method and sweeps, with the Delassus operator as a matrix.
@@ -153,9 +147,9 @@ impl ContactSystem {
         !(self.work.error <= FAR_FROM_SOLVED)
     }
 
-    /// Whether the contacts are not far from solved, with the shifts that came of it, or what they may take is spent.
+    /// Whether the contacts are not far from solved, or what they may take is spent.
     pub fn is_done(&self) -> bool {
-        !(self.spent.are_shifts_behind || self.is_far_from_solved()) || self.work.is_exhausted
+        !self.is_far_from_solved() || self.work.is_exhausted
     }
 
     /// Takes note of what has changed.

@@ -2,23 +2,15 @@
 
 use super::delassus::ContactRows;
 use super::gaps::end;
-use super::improve::{Around, CROWD, LIGHT_WORK};
-use super::system::{Change, ContactSystem, DenseSolve};
+use super::improve::{Around, CROWD};
+use super::system::{Change, ContactSystem};
 use crate::contact::Endpoint;
 use crate::solver::body_step::{BodyProblem, are_large};
 use crate::solver::cone::{Condensed, ConeTolerance, Effort};
 use crate::threads::for_each_item;
 
-/// Solves with a fresh shift of Newton's method. The second is from a warm start only, but while a step is light, under heavy loads and in
-/// the last iteration: where the shift changes the forces by more than that bridges, the next iteration changes them again. With two
-/// continuations, what a mover at 5 m/s drives into five loaded cubes took 770 Newton steps a step, 2.3 to 2.8 times as long. Never a second
-/// one, and the only iteration of cheap presets makes energy on hilly floors.
+/// Solves with a fresh shift of Newton's method.
 const SHIFT_ROUNDS: usize = 2;
-/// Ratio of masses from which on the second may always go on by continuation. Without that, a cube of ν = 0.49 on which a thousand times its
-/// mass is set down has a step rejected. Measured at 1, 70 and 1000 only; links of multibodies do not count.
-const HEAVY: f64 = 100.0;
-/// Second solves of a step that may wait for the next iteration: no step goes on for them for ever.
-const WAITS: usize = 20;
 /// Newton's method is solved no less exactly: its last steps are its cheapest, and what looser forces leave to the next
 /// outer iteration takes seven times as long (`Fidelity::Engineering` under a box, at 0.1).
 const LOOSEST: f64 = 1.0e-3;
@@ -112,9 +104,7 @@ impl ContactSystem {
         self.add_targets(&mut g_free);
         self.dense.g_free = g_free;
         let slides = self.active.iter().any(|contact| contact.constraint.dimension() == 3);
-        for round in 0..if slides { SHIFT_ROUNDS } else { 1 } {
-            let may_climb = round == 0 || effort == Effort::Warm || self.may_climb_again();
-            let effort = if may_climb { effort } else { Effort::Warm };
+        for _ in 0..if slides { SHIFT_ROUNDS } else { 1 } {
             let dense = &mut self.dense;
             dense.problem.g.clone_from(&dense.g_free);
             self.active.iter().for_each(|contact| dense.problem.g[contact.first] += contact.shift);
@@ -123,15 +113,9 @@ impl ContactSystem {
             let done = dense.condensation.solve_by_newton(problem, solver, forces, tolerance, effort);
             self.work.newton_steps += done.newton_steps;
             self.work.factorizations += done.factorizations;
-            self.spent.operations += done.factorizations * self.groups.factor_work();
-            self.spent.are_shifts_behind = !may_climb && done.failures > 0;
-            if self.spent.are_shifts_behind {
-                self.spent.waits += 1;
-                self.take_gaps();
-                break;
-            }
             self.work.failures += done.failures;
             self.work.error = done.error;
+            self.spent.operations += done.factorizations * self.groups.factor_work();
             if done.failures > 0 && effort != Effort::Full {
                 self.lambda.clone_from(&self.before);
                 let shifts = self.active.iter_mut().zip(&self.shift_before);
@@ -139,23 +123,11 @@ impl ContactSystem {
                 self.outdate(Change::Forces);
                 return None;
             }
-            self.take_gaps();
+            self.gaps.clear();
+            self.gaps.extend(dense.g_free.iter().zip(&dense.slips).map(|(gap, slip)| gap + slip));
             self.update_shifts(1.0);
         }
         Some(self.move_bodies(bodies, around))
-    }
-
-    /// Takes the gaps and slips under the forces as they are.
-    fn take_gaps(&mut self) {
-        let DenseSolve { g_free, slips, .. } = &self.dense;
-        self.gaps.clear();
-        self.gaps.extend(g_free.iter().zip(slips).map(|(gap, slip)| gap + slip));
-    }
-
-    /// Whether a second solve of an iteration may take a continuation.
-    fn may_climb_again(&self) -> bool {
-        let is_heavy = self.dense.problem.mass_ratio > HEAVY;
-        self.is_last || self.spent.operations < LIGHT_WORK || self.spent.waits >= WAITS || is_heavy
     }
 
     /// Sweeps over the contacts, as many as a share of the step's budget; whether the forces have changed.
