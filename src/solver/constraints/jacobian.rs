@@ -119,8 +119,8 @@ pub(super) struct Operands<'a> {
     pub proxies: &'a RigidProxies,
 }
 
-/// What an endpoint's directions move of a body with a frame per node, at the nodes that were asked for: where bodies are crushed into one
-/// another, hundreds of contacts ask for the same tens of nodes.
+/// What an endpoint's directions move of a body, at the nodes that were asked for: where bodies are crushed into one another, hundreds of
+/// contacts ask for the same tens of nodes.
 #[derive(Default)]
 pub(super) struct NodeMotions {
     endpoint: u32,
@@ -187,16 +187,22 @@ impl Operands<'_> {
             // Weights add up to one.
             return sum + a.deflated.tr_mul(&b.directions) + a.directions.tr_mul(&b.deflated);
         }
+        let turns = a.form == BlockForm::Other;
         for k in 0..a.count {
-            for l in 0..b.count {
-                let mut block = inverse(k, l);
-                if a.form == BlockForm::Other {
-                    block = preconditioner.compliance(factor, &block, a.nodes[k], b.nodes[l]);
-                }
-                sum += block * (a.weights[k] * b.weights[l]);
-            }
+            let motion = || {
+                let part = |l: usize| {
+                    let block = inverse(k, l);
+                    let block = match turns {
+                        true => preconditioner.compliance(factor, &block, a.nodes[k], b.nodes[l]),
+                        false => block,
+                    };
+                    block * b.weights[l]
+                };
+                (0..b.count).map(part).sum::<Mat3>() * b.directions
+            };
+            sum += moved.at(a.places[k], motion) * a.weights[k];
         }
-        a.directions.tr_mul(&(sum * b.directions))
+        a.directions.tr_mul(&sum)
     }
 
     #[inline(always)]
