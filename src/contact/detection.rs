@@ -4,6 +4,7 @@ use super::constraint::Constraint;
 use super::obstacle::Obstacle;
 use super::pair_scene::{Pair, PairScene, near, one_constraint_per_feature};
 use super::rim_contact::{corner_on_triangle, corners_in, rim_crossing};
+use super::second_wall::walls_at;
 use super::shape_table::Solidity;
 use super::surface_point::{SurfacePoint, carried_point, surface_point};
 use super::surface_tree::ROUNDING;
@@ -207,12 +208,13 @@ impl Detector {
             };
             self.found.push(s as u32);
             if let Some(found) = self.nodes[s].filter(|f| f.gap < reach) {
-                constraints.push(scene.constraint(
-                    [nodes[s], 0, 0],
-                    [1.0, 0.0, 0.0],
-                    &found,
-                    (Feature::Node(nodes[s]), 0),
-                ));
+                let walls = match surface.is_thin[s] {
+                    true => walls_at(scene, nodes[s], &p, found, reach, memory),
+                    false => [(0, Some(found)), (1, None)],
+                };
+                for (slot, found) in walls.iter().filter_map(|(slot, found)| Some((slot, found.as_ref()?))) {
+                    constraints.push(scene.node_constraint(nodes[s], *slot, found));
+                }
             }
         }
     }

@@ -14,6 +14,7 @@ mod candidates;
 mod surface_point;
 
 mod rim_contact;
+mod second_wall;
 mod thin_contact;
 mod triangle_contact;
 

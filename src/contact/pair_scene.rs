@@ -67,8 +67,24 @@ impl<'a> PairScene<'a> {
         }
     }
 
-    /// The constraint of a point; its name is a feature and a slot. With plane faces one per feature is kept.
+    /// The constraint of a point; its name is a feature and a slot. With plane faces one per feature is kept, but for nodes in hollows.
     pub fn constraint(
+        &self,
+        nodes: [u32; 3],
+        weights: [f64; 3],
+        found: &SurfacePoint,
+        (feature, slot): (Feature, u32),
+    ) -> Constraint {
+        let slot = if self.obstacle.kind().is_faceted { 0 } else { slot };
+        self.named_constraint(nodes, weights, found, (feature, slot))
+    }
+
+    /// That of a node with one of the walls that it touches.
+    pub fn node_constraint(&self, node: u32, wall: u32, found: &SurfacePoint) -> Constraint {
+        self.named_constraint([node, 0, 0], [1.0, 0.0, 0.0], found, (Feature::Node(node), wall))
+    }
+
+    fn named_constraint(
         &self,
         nodes: [u32; 3],
         weights: [f64; 3],
@@ -78,7 +94,6 @@ impl<'a> PairScene<'a> {
         let obstacle = self.obstacle;
         let soft = Endpoint::Soft { body: self.pair.body, nodes, weights };
         let proxy = Endpoint::Rigid { proxy: obstacle.proxy, point: obstacle.start.transform(&found.point) };
-        let slot = if obstacle.kind().is_faceted { 0 } else { slot };
         let key = ObstacleContact { collider: obstacle.key, part: obstacle.part, feature, slot };
         let key = ConstraintKey::Obstacle(key);
         let normal = obstacle.start.rotation * found.normal;

@@ -44,14 +44,25 @@ pub(crate) fn side_of_node(
 /// Against the normal that carried a node in the last step, in the obstacle's frame, if one did; `memory` are the last step's
 /// contacts with the obstacle, ascending by key.
 pub(crate) fn against_carried(obstacle: &Obstacle, node: u32, memory: &[ConstraintMemory]) -> Option<Vec3> {
-    let feature = |m: &ConstraintMemory| match m.key {
-        ConstraintKey::Obstacle(contact) => Some(contact.feature),
+    carried_normals(obstacle, node, memory).next().map(|(_, normal)| -normal)
+}
+
+/// Normals that carried a node in the last step, with the slots of their contacts.
+pub(super) fn carried_normals<'a>(
+    obstacle: &'a Obstacle,
+    node: u32,
+    memory: &'a [ConstraintMemory],
+) -> impl Iterator<Item = (u32, Vec3)> + Clone + 'a {
+    let contact = |m: &ConstraintMemory| match m.key {
+        ConstraintKey::Obstacle(contact) => Some(contact),
         _ => None,
     };
     let own = Some(Feature::Node(node));
-    let place = memory.partition_point(|m| feature(m) < own);
-    let carried = memory.get(place).filter(|m| feature(m) == own)?;
-    Some(-obstacle.start.rotation.tr_mul(&carried.geometry.frame[0]))
+    let feature = move |m: &ConstraintMemory| contact(m).map(|c| c.feature);
+    let first = memory.partition_point(|m| feature(m) < own);
+    let here = memory[first..].iter().take_while(move |m| feature(m) == own);
+    let normal = |m: &ConstraintMemory| obstacle.start.rotation.tr_mul(&m.geometry.frame[0]);
+    here.map(move |m| (contact(m).map_or(0, |c| c.slot), normal(m)))
 }
 
 /// Whether a triangle has to be turned over to look at the obstacle: as its corners found it (`found`), else
