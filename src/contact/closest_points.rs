@@ -33,7 +33,8 @@ impl Detector {
         let carried = memory.iter().filter(|m| m.force != Vec3::zeros());
         for kept in carried {
             let ConstraintKey::Obstacle(contact) = kept.key else { continue };
-            if contact.slot < FIRST_POINT {
+            // A node's second wall is none, of what was a mesh in the last step.
+            if contact.slot < FIRST_POINT || matches!(contact.feature, Feature::Node(_)) {
                 continue;
             }
             let (nodes, weights) = (kept.geometry.nodes[0], kept.geometry.weights[0]);

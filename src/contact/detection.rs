@@ -4,11 +4,11 @@ use super::constraint::Constraint;
 use super::obstacle::Obstacle;
 use super::pair_scene::{Pair, PairScene, near, one_constraint_per_feature};
 use super::rim_contact::{corner_on_triangle, corners_in, rim_crossing};
-use super::second_wall::walls_at;
+use super::second_wall::{carried_wall, walls_at};
 use super::shape_table::Solidity;
-use super::surface_point::{SurfacePoint, carried_point, surface_point};
+use super::surface_point::{SurfacePoint, surface_point};
 use super::surface_tree::ROUNDING;
-use super::thin_contact::{against_carried, looks_away, side_of_node};
+use super::thin_contact::{looks_away, side_of_node};
 use crate::body::{ConstraintMemory, Feature};
 use crate::fem::DeformableModel;
 use crate::math::{Vec3, from_real, to_real};
@@ -199,13 +199,11 @@ impl Detector {
                 if surface.is_thin[s] { side() } else { to_local(&self.normals[s]) }
             };
             let is_sheet = scene.obstacle.solidity() == Solidity::Sheet;
-            let carried = is_sheet.then(|| against_carried(scene.obstacle, nodes[s], memory)).flatten();
-            self.nodes[s] = match carried {
-                Some(outward) => {
-                    carried_point(scene.obstacle, &p, &outward, surface.is_thin[s], &scene.scales)
-                }
-                None => surface_point(scene.obstacle, &p, &outward(), &scene.scales),
-            };
+            let carried = || carried_wall(scene, nodes[s], &p, surface.is_thin[s], memory);
+            self.nodes[s] = is_sheet
+                .then(carried)
+                .flatten()
+                .or_else(|| surface_point(scene.obstacle, &p, &outward(), &scene.scales));
             self.found.push(s as u32);
             if let Some(found) = self.nodes[s].filter(|f| f.gap < reach) {
                 let walls = match surface.is_thin[s] {
