@@ -82,3 +82,28 @@ fn most_of_what_is_thrown_into_gutters_stays_in_them() {
     println!("{caught} of 60 caught, lowest vertex {lowest:.4} m above the bottom");
     assert!(caught <= 10 && lowest > -0.05, "{caught} caught, {lowest} m");
 }
+
+/// Over the edge of a box that is a mesh nothing stands in the way.
+#[test]
+fn cloths_slide_over_edges_of_meshes() {
+    let cuboid = Cuboid::new(Vector::new(1.0, 5.0, 5.0)).to_trimesh();
+    let mut physics = PhysicsWorld::new();
+    let table =
+        ColliderBuilder::trimesh(cuboid.0, cuboid.1).unwrap().friction(0.0).translation(Vector::Y * -5.0);
+    physics.insert(RigidBodyBuilder::fixed(), table);
+    let mut world = DeformableWorld::new();
+    let cloth = DeformableBodyBuilder::cloth([0.2, 0.2], [10, 10], 0.001);
+    let cloth = cloth
+        .material(DeformableMaterial::new(1e5, 0.3).friction(0.0))
+        .translation(Vector::new(0.7, 6e-4, 0.0));
+    let cloth = world.insert(cloth.linvel(Vector::X)).unwrap();
+    let mut last = 0.0;
+    for step in 0..30 {
+        world.step(&mut physics);
+        let [x, ..] = world.bodies[cloth].center_of_mass();
+        // Until half of it hangs over the edge, and draws it on.
+        assert!(step == 0 || x - last > 0.9 / 60.0, "step {step}: {x} m, {last} m before");
+        last = x;
+    }
+    assert!(last > 1.15, "{last}");
+}
