@@ -28,10 +28,10 @@ pub(super) fn walls_at(
     reach: f64,
     memory: &[ConstraintMemory],
 ) -> [(u32, Option<SurfacePoint>); 2] {
-    let carried = carried_normals(scene.obstacle, node, memory);
+    let mut carried = carried_normals(scene.obstacle, node, memory);
     let is_first = |(_, normal): &(u32, Vec3)| normal.dot(&first.normal) >= PARALLEL;
     let own = carried.clone().find(is_first);
-    let other = carried.filter(|c| !is_first(c)).next();
+    let other = carried.find(|c| !is_first(c));
     let slot =
         own.or(other.map(|(slot, normal)| (1 - slot.min(1), normal))).map_or(0, |(slot, _)| slot.min(1));
     let skin = scene.model.half_thickness[node as usize];
