@@ -26,7 +26,7 @@ fn rope(z: f32, y: f32) -> DeformableBodyBuilder {
     rope.material(DeformableMaterial::new(1e6, 0.3).friction(0.1)).translation(Vector::new(0.013, y, z))
 }
 
-/// Lowest and highest vertex at the end, after `steps`.
+/// Heights of the lowest and the highest vertex after so many seconds \[m\].
 fn heights(collider: ColliderBuilder, body: DeformableBodyBuilder, dt: f32, seconds: f32) -> [f64; 2] {
     let mut physics = PhysicsWorld::new();
     physics.integration_parameters.dt = dt;

@@ -32,8 +32,11 @@ pub(super) fn walls_at(
     let is_first = |(_, normal): &(u32, Vec3)| normal.dot(&first.normal) >= PARALLEL;
     let own = carried.clone().find(is_first);
     let other = carried.find(|c| !is_first(c));
-    let slot =
-        own.or(other.map(|(slot, normal)| (1 - slot.min(1), normal))).map_or(0, |(slot, _)| slot.min(1));
+    let slot = match (own, other) {
+        (Some((slot, _)), _) => slot.min(1),
+        (None, Some((slot, _))) => 1 - slot.min(1),
+        (None, None) => 0,
+    };
     let skin = scene.model.half_thickness[node as usize];
     let reach = reach.min(skin + FARTHEST * scene.scales.shift);
     let second =

@@ -43,7 +43,7 @@ pub(crate) fn side_of_node(
 
 /// Against the normal that carried a node in the last step, in the obstacle's frame, if one did; `memory` are the last step's
 /// contacts with the obstacle, ascending by key.
-pub(crate) fn against_carried(obstacle: &Obstacle, node: u32, memory: &[ConstraintMemory]) -> Option<Vec3> {
+fn against_carried(obstacle: &Obstacle, node: u32, memory: &[ConstraintMemory]) -> Option<Vec3> {
     carried_normals(obstacle, node, memory).next().map(|(_, normal)| -normal)
 }
 
