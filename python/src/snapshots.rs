@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// What every snapshot begins with.
 const MAGIC: &[u8; 8] = b"foible3d";
 /// The layout of what follows; one more with every change of it, in the crate, in rapier or here.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// A world as bytes.
 pub fn save(inner: &Inner) -> PyResult<Vec<u8>> {

@@ -54,7 +54,7 @@ def test_what_is_no_snapshot_is_refused():
         (b"", "these 0 bytes are no snapshot"),
         (b"no snapshot", "no snapshot"),
         (saved[:10], "ends within its head"),
-        (saved[:8] + b"\x63\0\0\0" + saved[12:], "of version 99; this package reads version 5"),
+        (saved[:8] + b"\x63\0\0\0" + saved[12:], "of version 99; this package reads version 6"),
         (saved[:-3], "damaged"),
         (saved + b"x", "1 bytes are left"),
     ]:

@@ -113,7 +113,6 @@ impl DeformableBody {
             contacts: Vec::new(),
             shared: Vec::new(),
             impacts: Vec::new(),
-            is_unsolved: false,
             pair_data: Vec::new(),
             dampers: Vec::new(),
             history: History::default(),

@@ -29,11 +29,10 @@ pub enum Solver {
     /// Newton's method: the second derivatives of the energy itself, factored anew in every iteration. The
     /// reference, and right for ropes and stiff cloth.
     Newton,
-    /// [`Solver::Newton`] while the body hangs by pins and hard attachments, an iteration in the place of ten of `max_iterations`;
-    /// three in contact where it is slow and its last step was far from solved, which is how what hangs over an edge comes down;
-    /// else [`Solver::Projective`]: where anything comes near enough to touch it within the step, a cable runs through it or it is attached to what
-    /// yields, so few end unsolved. The default of sheets of more than 256 vertices: what hangs comes
-    /// to rest where it should, at 1.5 times the price of the constant matrix with 441 vertices, 3 times with 1681, 5 times with 10 000.
+    /// [`Solver::Newton`] while the body hangs by pins and hard attachments, an iteration in the place of ten of `max_iterations`, and three
+    /// where anything comes near enough to touch it within the step, a cable runs through it or it is attached to what yields;
+    /// [`Solver::Projective`] in flight. The default of sheets of more than 256 vertices: what hangs and what is draped comes
+    /// to rest where it should. One iteration takes 1.5 times as long as ten of the constant matrix with 441 vertices, 3 times with 1681, 5 times with 10 000.
     Automatic,
 }
 
@@ -242,7 +241,7 @@ pub struct SolverSettings {
     /// Slices of a solid along its length, up to 32, that the [`SystemMatrix::Laplacian`] lets turn: it resists
     /// rotation, of the body and within it, and these take that out. Zero, the default, leaves it.
     pub clusters: usize,
-    /// Global iterations at the most, at least one; of [`Solver::Automatic`] a tenth where it takes Newton's method, three in contact,
+    /// Global iterations at the most, at least one; of [`Solver::Automatic`] a tenth where it takes Newton's method, three tenths in contact,
     /// rounded up. Bodies that touch one rigid body are solved together: the largest limit among them counts.
     pub max_iterations: usize,
     /// Iterate until the largest residual force is below this fraction of the largest force on a
@@ -287,16 +286,16 @@ impl Default for SolverSettings {
 /// Iterations of the constant matrix in the place of which [`Solver::Automatic`] takes one of Newton's method.
 const ITERATIONS_OF_NEWTON: usize = 10;
 /// As many times more where the body is touched.
-const SETTLING_ITERATIONS: usize = 3;
+const TOUCHED_ITERATIONS: usize = 3;
 
 /// What [`Solver::Automatic`] goes by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum StepState {
     /// Pinned, and not touched.
     Hangs,
-    /// Touched, slow, and the last step was far from solved.
-    Settles,
-    Other,
+    Touched,
+    /// Neither.
+    Flies,
 }
 
 impl SolverSettings {
@@ -308,8 +307,8 @@ impl SolverSettings {
         };
         match (self.solver, state) {
             (Solver::Automatic, StepState::Hangs) => newton(1),
-            (Solver::Automatic, StepState::Settles) => newton(SETTLING_ITERATIONS),
-            (Solver::Automatic, StepState::Other) => self.solver(Solver::Projective),
+            (Solver::Automatic, StepState::Touched) => newton(TOUCHED_ITERATIONS),
+            (Solver::Automatic, StepState::Flies) => self.solver(Solver::Projective),
             _ => self,
         }
     }

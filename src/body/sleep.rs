@@ -75,7 +75,6 @@ impl DeformableBody {
     pub(crate) fn count_stillness(&mut self, dt: f64) {
         let still = self.can_sleep
             && self.max_speed() < self.sleep_speed
-            && !self.state.is_unsolved
             && !self.has_moving_pins()
             && branch_strain(&self.elements(), &self.state.x, &self.state.dampers) < STILL_STRAIN;
         self.state.sleep.still_for = if still { self.state.sleep.still_for + dt } else { 0.0 };

@@ -25,7 +25,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 /// Of what is written. Another one is refused: numbers of another layout would be read as something else.
-const VERSION: u32 = 10;
+const VERSION: u32 = 11;
 
 /// Comes first, so that nothing of another version is read.
 #[derive(Serialize)]

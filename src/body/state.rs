@@ -36,8 +36,6 @@ pub struct DeformableState {
     pub(crate) factor_base: FactorBase,
     /// Rods that are held against roll, ascending.
     pub(crate) twists: Vec<HeldTwist>,
-    /// Of bodies with an automatic solver: the last step was far from solved, and not rejected.
-    pub(crate) is_unsolved: bool,
 }
 
 /// The state before the last step; empty where no step can go on from it.

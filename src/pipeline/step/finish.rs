@@ -10,15 +10,12 @@ use super::sleeping::LookAround;
 use super::work::IslandWork;
 use crate::body::{
     DeformableAttachment, DeformableBody, DeformableBodyHandle, DeformableBodySet, DeformableContact,
-    DeformablePairContact, DeformableState, Integrator, Solver, is_number,
+    DeformablePairContact, DeformableState, Integrator, is_number,
 };
 use crate::coupling::StepContext;
 use crate::pipeline::DeformableCounters;
 use crate::solver::{BodyProblem, ROUNDING};
 use rapier3d::math::Vector;
-
-/// Part of a node's mean weight that a step leaves unsolved, above which it counts as far from solved.
-const UNSOLVED: f64 = 0.5;
 
 impl StepScratch {
     pub(super) fn advance(&mut self, deformables: &mut DeformableBodySet, h: f64) {
@@ -129,9 +126,6 @@ pub(super) fn store(
     body.report.iterations = work.island.report.iterations;
     body.report.residual = problem.residual();
     body.report.tolerance = problem.settings.tolerance.max(ROUNDING) * problem.force_scale();
-    let is_automatic = body.settings().solver == Solver::Automatic;
-    let bound = body.report.tolerance.max(UNSOLVED * problem.weight);
-    body.state.is_unsolved = is_automatic && !problem.is_rejected && body.report.residual > bound;
     body.report.guard_retries = problem.guard_retries;
     counters.guard_retries += problem.guard_retries;
     counters.not_converged += usize::from(!body.last_converged());

@@ -8,9 +8,6 @@ use crate::math::{Mat3, Vec3};
 use crate::solver::counters::SolveCounters;
 use crate::solver::linear::{FactorId, FactorKey, Preconditioner};
 
-/// Largest speed [m/s] at which a touched body is solved by Newton's method, if it has an automatic solver.
-const SETTLING: f64 = 0.2;
-
 impl BodyProblem {
     /// Of a body at the start of a step of `h` \[s\] under `gravity` [m/s²], with the nodes that attachments prescribe.
     pub fn new(body: &DeformableBody, h: f64, gravity: &Vec3, prescribed: &[PrescribedNode]) -> Self {
@@ -108,9 +105,9 @@ impl BodyProblem {
     fn settings_of(&self, body: &DeformableBody) -> SolverSettings {
         let is_pinned = !(body.pins.is_empty() && self.prescribed.is_empty());
         body.settings().of_step(match self.is_touched {
-            true if body.state.is_unsolved && body.max_speed() < SETTLING => StepState::Settles,
+            true => StepState::Touched,
             false if is_pinned => StepState::Hangs,
-            _ => StepState::Other,
+            false => StepState::Flies,
         })
     }
 

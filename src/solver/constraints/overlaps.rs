@@ -52,9 +52,17 @@ impl ContactSystem {
     }
 }
 
-/// Whether a step begins with two solids in one another: of sheets and ropes none is inside the other.
+/// Whether a step begins with two solids in one another, or with a sheet behind the surface of an obstacle: of deformable sheets and ropes none
+/// is inside the other. A cloth of 441 vertices and 1e8 Pa over the edges of a table, where its nodes come to lie a micrometre within, was
+/// rejected in 314 of 479 steps while what brings it out counted as made of nothing, and in one without. With ropes too one of 1e6 Pa
+/// gained a fifth of its energy on a slab (`tests/extreme_floors.rs`).
 pub(super) fn is_overlap(constraint: &Constraint, bodies: &[BodyProblem]) -> bool {
-    is_contact_within(constraint) && constraint.endpoints.iter().all(|e| is_solid(e, bodies))
+    let is_soft = matches!(constraint.key, ConstraintKey::SoftPair(_));
+    let is_inside = |endpoint: &Endpoint| match endpoint {
+        Endpoint::Soft { body, .. } if !is_soft && bodies[*body].is_sheet() => true,
+        _ => is_solid(endpoint, bodies),
+    };
+    is_contact_within(constraint) && constraint.endpoints.iter().all(is_inside)
 }
 
 /// Whether a step begins with a sheet or a rope behind the surface of another deformable body. Under what weighs on a cloth the work is that

@@ -71,14 +71,14 @@ impl FactorKey {
             pins: Vec::new(),
             base: Vec::new(),
         };
-        key.update(body, body.settings().of_step(StepState::Other).solver, h, std::iter::empty());
+        key.update(body, body.settings().of_step(StepState::Touched).solver, h, std::iter::empty());
         key
     }
 
     /// As [`FactorKey::new`], of a body that nothing touches, and that hangs if it is pinned.
     pub fn untouched(body: &DeformableBody, h: f64) -> Self {
         let mut key = Self::new(body, h);
-        let state = if key.pins.is_empty() { StepState::Other } else { StepState::Hangs };
+        let state = if key.pins.is_empty() { StepState::Flies } else { StepState::Hangs };
         key.update(body, body.settings().of_step(state).solver, h, std::iter::empty());
         key
     }
