@@ -1,5 +1,5 @@
-//! Cloths of more than 256 vertices, at their defaults, that come to lie on things: no step in which they move as boards, and none that
-//! leaves them in the air.
+//! Cloths of more than 256 vertices, at their defaults, that come to lie on things: few of their steps are rejected, in which they move as
+//! boards, and none stays in the air.
 mod common;
 use common::thin::*;
 use foible3d::prelude::*;
@@ -66,9 +66,9 @@ fn what_tablecloths_come_to_is_what_newtons_method_comes_to() {
     assert!((found - truth).abs() < 0.01, "{found} {truth}");
 }
 
-/// Balls, floors and hills, of which a mesh is one.
+/// On a ball, a floor and a heightfield.
 #[test]
-fn cloths_lie_on_anything_without_a_rejected_step() {
+fn cloths_lie_down_with_few_rejected_steps() {
     let top = TOP as f32;
     let n = 30;
     let height = |k: usize| {
@@ -76,14 +76,11 @@ fn cloths_lie_on_anything_without_a_rejected_step() {
         0.05 * ((i * 0.7).sin() + (j * 0.9).cos())
     };
     let heights = rapier3d::parry::utils::Array2::new(n, n, (0..n * n).map(height).collect());
-    let hills = || {
-        let hills = ColliderBuilder::heightfield(heights.clone(), Vector::new(4.0, 1.0, 4.0));
-        hills.translation(Vector::Y * (top - 0.1))
-    };
+    let hills = ColliderBuilder::heightfield(heights, Vector::new(4.0, 1.0, 4.0));
     let things = [
         ("ball", ColliderBuilder::ball(0.3).translation(Vector::new(0.02, top - 0.3, 0.01))),
         ("floor", ColliderBuilder::cuboid(2.0, 0.1, 2.0).translation(Vector::Y * (top - 0.1))),
-        ("hills", hills()),
+        ("hills", hills.translation(Vector::Y * (top - 0.1))),
     ];
     for (name, thing) in things {
         for (e, dt) in [(1e4, 1.0 / 60.0), (1e6, 1.0 / 60.0), (1e7, 1.0 / 60.0), (1e6, 1.0 / 20.0)] {

@@ -144,11 +144,6 @@ impl BodyProblem {
         Elements { model: &self.model, materials: &self.materials, activations: &self.activations }
     }
 
-    /// Whether it is made of triangles and nothing solid.
-    pub fn is_sheet(&self) -> bool {
-        !self.model.triangles.is_empty() && !self.model.surface.is_closed()
-    }
-
     pub fn masses(&self) -> &[f64] {
         &self.masses
     }

@@ -11,9 +11,9 @@ use super::gaps::{motion, relative_motion};
 use super::groups::ContactGroups;
 use super::lists::{ActiveContact, Candidate, ContactResult};
 use super::matrix_free::Response;
-use super::overlaps::is_overlap;
+use super::overlaps::{is_overlap, is_soft_pair};
 use super::rigid_proxy::{Reaction, RigidProxies};
-use crate::body::{ConstraintKey, ConstraintMemory};
+use crate::body::ConstraintMemory;
 use crate::contact::{Constraint, Endpoint, Law};
 use crate::math::Vec3;
 use crate::solver::body_step::BodyProblem;
@@ -182,8 +182,7 @@ impl ContactSystem {
                 let moved = relative_motion(constraint, bodies, at, context, &reactions);
                 made += force.dot(&moved);
                 if is_overlap(constraint, bodies) {
-                    let is_soft = matches!(constraint.key, ConstraintKey::SoftPair(_));
-                    *if is_soft { &mut recovered } else { &mut from_rigid } +=
+                    *if is_soft_pair(constraint) { &mut recovered } else { &mut from_rigid } +=
                         self.work_of_recovery(contact, &moved);
                 }
                 exchanged +=
