@@ -44,8 +44,8 @@ fn table() -> ColliderBuilder {
     ColliderBuilder::cuboid(0.3, 0.1, 0.3).translation(Vector::new(0.0, TOP as f32 - 0.1, 0.0))
 }
 
-/// What overhangs is 0.2 m long, 0.28 m at the corners. Once nine of ten steps of each were rejected, for the work of what brought nodes out
-/// that lay a micrometre within the table: of the first three the lowest vertex came down at a few centimetres a second.
+/// What overhangs is 0.2 m long, 0.28 m at the corners. Once 8 to 32 % of the steps of the first three were rejected and 51 and 90 % of the
+/// others, partly for the work of what brought nodes out that lay a micrometre within the table; the last one stayed on it as a board.
 #[test]
 fn tablecloths_come_down() {
     let of = |cells, e, dt| Drape { cells, e, dt };
@@ -66,7 +66,7 @@ fn what_tablecloths_come_to_is_what_newtons_method_comes_to() {
     assert!((found - truth).abs() < 0.01, "{found} {truth}");
 }
 
-/// On a ball, a floor and a heightfield.
+/// On a ball, a floor and a heightfield. Once up to 61, 91 and 77 % of the steps were rejected.
 #[test]
 fn cloths_lie_down_with_few_rejected_steps() {
     let top = TOP as f32;
