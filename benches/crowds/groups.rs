@@ -4,7 +4,7 @@ use crate::claims::*;
 use crate::engines::{self, Engine, Run};
 use crate::report::{Report, Times, brief, last_second, settled};
 use crate::scene::Scene;
-use crate::scenes::{self, Steps};
+use crate::scenes::{self, Faller, Steps};
 use crate::{level, random, rollback};
 
 /// Runs of both engines.
@@ -90,6 +90,22 @@ fn sleep(count: usize, awake: &Run, report: &mut Report) {
         ),
     };
     report.line(&scene, Engine::Foible, &run, &also);
+}
+
+/// On what has its vertices nearer to one another than the body has its own, each of which might carry.
+pub fn terrain(report: &mut Report) {
+    for faller in [Faller::Cloth, Faller::Rope, Faller::Cube] {
+        for cell in [0.1, 0.033, 0.01] {
+            let scene = scenes::terrain(faller, cell);
+            let runs = both(&scene);
+            let ratios = compare(&scene, &runs, report);
+            let [ours, theirs] = &runs;
+            let detection = 1e2 * detection(ours);
+            report.line(&scene, Engine::Foible, ours, &format!("{ratios}; detection {detection:.1} %"));
+            report.line(&scene, Engine::Rapier, theirs, "");
+            report.worst_steps(&scene.name, ours, 1);
+        }
+    }
 }
 
 pub fn pinch(report: &mut Report) {

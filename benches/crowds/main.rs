@@ -2,7 +2,7 @@
 //!
 //! Heaps, a pinch, first touches, slabs, steps of changing length, a rollback, a level and random scenes;
 //! milliseconds of computing of the one thread that steps, over all steps from the fall on. Groups by name run alone:
-//! `-- heaps`, `-- threads` (a heap on one and on two), `-- pinch`, `-- touch` (with its cube of 98 000 tets), `-- slabs`, `-- variable`, `-- rollback`,
+//! `-- heaps`, `-- threads` (a heap on one and on two), `-- terrain`, `-- pinch`, `-- touch` (with its cube of 98 000 tets), `-- slabs`, `-- variable`, `-- rollback`,
 //! `-- level`, `-- random` (300 scenes; `-- random 50` as many). `-- all` adds heaps of 100 and 200 and the cube of
 //! 98 000 tets. A run ends early when its time is up and then says after how many steps. At the end come our worst
 //! steps with what they did, and the claims that this run holds or does not. Writes `target/crowds.csv`.
@@ -32,8 +32,8 @@ fn main() {
     let args: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     let has = |name: &str| args.iter().any(|a| a == name);
     let number = args.iter().find_map(|a| a.parse().ok());
-    const GROUPS: [&str; 9] =
-        ["heaps", "threads", "pinch", "touch", "slabs", "variable", "rollback", "level", "random"];
+    const GROUPS: [&str; 10] =
+        ["heaps", "threads", "terrain", "pinch", "touch", "slabs", "variable", "rollback", "level", "random"];
     let every = !GROUPS.iter().any(|group| has(group));
     let all = has("all");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread pool");
@@ -43,6 +43,7 @@ fn main() {
             match group {
                 "heaps" => groups::heaps(all, &mut report),
                 "threads" => groups::threads(&mut report),
+                "terrain" => groups::terrain(&mut report),
                 "pinch" => groups::pinch(&mut report),
                 "touch" => groups::first_touches(all || !every, &mut report),
                 "slabs" => groups::slabs(&mut report),

@@ -28,7 +28,7 @@ pub fn insert(
         };
         let material = DeformableMaterial::new(soft.e, soft.nu).friction(0.5).mass_damping(soft.damping);
         let can_sleep = scene.sleeps && soft.can_sleep;
-        let builder = builder.pose(soft.pose).material(material).can_sleep(can_sleep);
+        let builder = builder.pose(soft.pose).linvel(soft.velocity).material(material).can_sleep(can_sleep);
         let handle = world.insert(builder).expect("a valid body");
         bind(soft, handle, physics, rigid, world);
         handles.push(handle);

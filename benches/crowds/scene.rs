@@ -23,6 +23,8 @@ pub struct Soft {
     pub nu: f64,
     /// 1/s, of the velocity.
     pub damping: f64,
+    /// At the start [m/s].
+    pub velocity: Vector,
     /// Whether it may, where the scene's bodies may.
     pub can_sleep: bool,
     /// Which places of the undeformed body are held.
@@ -38,7 +40,17 @@ impl Soft {
 
     pub fn of(form: Form, pose: Pose) -> Self {
         let (held, ties) = (None, Vec::new());
-        Self { form, pose, e: 1e6, nu: 0.3, damping: 0.0, can_sleep: true, held, ties }
+        Self {
+            form,
+            pose,
+            e: 1e6,
+            nu: 0.3,
+            damping: 0.0,
+            velocity: Vector::ZERO,
+            can_sleep: true,
+            held,
+            ties,
+        }
     }
 
     pub fn mesh(&self) -> Option<&Arc<TetMesh>> {

@@ -1,7 +1,7 @@
 //! The scenes.
 
 use crate::random::Random;
-use crate::scene::{Rigid, Scene, Soft, Way};
+use crate::scene::{Form, Rigid, Scene, Soft, Way};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 use std::sync::Arc;
@@ -139,4 +139,41 @@ pub fn variable_step(swings: bool, lengths: Steps) -> Scene {
     let what = if swings { "swings" } else { "lands" };
     let (dt, steps) = lengths.lengths();
     Scene { dt, steps, cap: 20.0, ..Scene::new(format!("{what}, {}", lengths.name()), vec![soft], rigid) }
+}
+
+/// What falls onto a terrain.
+#[derive(Clone, Copy)]
+pub enum Faller {
+    Cloth,
+    Rope,
+    Cube,
+}
+
+/// A cloth of 1 m² and 441 vertices, a rope of 1 m or a cube of 0.3 m and 3072 tets falls at 5 m/s onto a mesh of hills 10 cm high, 2 m
+/// wide, of squares of `cell` \[m\]: where they are small, a square of the cloth lies on 25 of them.
+pub fn terrain(faller: Faller, cell: f32) -> Scene {
+    let start = Pose::from_translation(Vector::new(0.01, 0.4, 0.013));
+    let (what, mut soft) = match faller {
+        Faller::Cloth => ("cloth", Soft::of(Form::Cloth([0.5, 0.5], [20, 20], 0.004), start)),
+        Faller::Rope => {
+            let points = (0..=40).map(|k| Vector::X * (0.025 * k as f32 - 0.5)).collect();
+            ("rope", Soft::of(Form::Rope(points, 0.01), start))
+        }
+        Faller::Cube => ("cube", Soft::new(&cube(0.15, [8; 3]), start)),
+    };
+    soft.velocity = Vector::Y * -5.0;
+    let ground = Rigid::new(RigidBodyBuilder::fixed(), hills((2.0 / cell).round() as u32));
+    let name = format!("{what} on terrain of {:.0} mm", 1e3 * cell);
+    Scene { steps: 120, cap: 30.0, ..Scene::new(name, vec![soft], vec![ground]) }
+}
+
+/// A mesh of 2 m by 2 m in so many squares each way.
+fn hills(cells: u32) -> ColliderBuilder {
+    let n = cells + 1;
+    let at = |i: u32| 2.0 * i as f32 / cells as f32 - 1.0;
+    let height = |x: f32, z: f32| 0.05 * (7.0 * x).sin() * (6.0 * z).cos();
+    let points = (0..n * n).map(|k| (at(k / n), at(k % n))).map(|(x, z)| Vector::new(x, height(x, z), z));
+    let squares = (0..cells * cells).map(|k| k / cells * n + k % cells);
+    let faces = squares.flat_map(|a| [[a, a + 1, a + n], [a + 1, a + n + 1, a + n]]);
+    ColliderBuilder::trimesh(points.collect(), faces.collect()).expect("a mesh")
 }

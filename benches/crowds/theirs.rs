@@ -18,6 +18,7 @@ pub fn insert(scene: &Scene, physics: &mut PhysicsWorld, rigid: &[RigidBodyHandl
             .surface_collider(ColliderBuilder::ball(0.02).density(0.0).friction(0.5))
             .pinned_particles(held.iter().map(|&v| v as u32));
         let handle = physics.insert_soft_body(builder);
+        (0..rest.len()).for_each(|v| physics.soft_bodies[handle].set_particle_velocity(v, soft.velocity));
         for (v, to) in ties {
             physics.soft_bodies[handle].attach_particle(v, rigid[to], &physics.bodies);
         }

@@ -133,7 +133,7 @@ impl Detector {
                 continue;
             }
             let edges = surface.triangle_edges[t].map(|e| self.on_edge(e));
-            let standing = self.standing.iter().filter(|(on, _)| *on == t).map(|(_, constraint)| constraint);
+            let standing = self.standing_on(t).iter().map(|corner| &corner.found);
             let known = s.iter().filter_map(|&s| self.nodes[s].as_ref());
             let [e0, e1, e2] = surface.triangle_edges[t].map(Feature::Edge);
             let own = [e0, e1, e2, Feature::Triangle(t as u32)];

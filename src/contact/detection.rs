@@ -1,9 +1,10 @@
 //! Contacts of one body with one obstacle.
 
 use super::constraint::Constraint;
+use super::corner_contacts::StandingCorner;
 use super::obstacle::Obstacle;
 use super::pair_scene::{Pair, PairScene, near, one_constraint_per_feature};
-use super::rim_contact::{corner_on_triangle, corners_in, rim_crossing};
+use super::rim_contact::rim_crossing;
 use super::second_wall::{carried_wall, walls_at};
 use super::shape_table::Solidity;
 use super::surface_point::{SurfacePoint, surface_point};
@@ -37,11 +38,16 @@ pub(crate) struct Detector {
     /// Surface nodes that have a point.
     found: Vec<u32>,
     near_edges: Vec<u32>,
+    /// Of an edge, those over triangles of a face.
+    parts: Vec<[f64; 2]>,
     /// Rim crossings, ascending by their edges.
     edges: Vec<(u32, SurfacePoint)>,
-    /// Corners of the obstacle, and which triangle each stands on.
-    corners: Vec<(u32, Vec3)>,
-    pub(super) standing: Vec<(usize, SurfacePoint)>,
+    /// Corners of the obstacle near the body, with their numbers.
+    pub(super) corners: Vec<(u32, Vec3)>,
+    /// Ascending by the triangles that they stand on.
+    pub(super) standing: Vec<StandingCorner>,
+    /// Places in `near` of the triangles that a corner may stand on.
+    pub(super) over: Vec<u32>,
     /// Closest points, kept from the last step and new: feature, slot, point.
     pub(super) points: Vec<(Feature, u32, SurfacePoint)>,
 }
@@ -109,7 +115,7 @@ impl Detector {
         if !kind.is_plane {
             self.list_near(surface);
             self.detect_rims(&scene, constraints);
-            self.detect_corners(&scene, constraints);
+            self.detect_corners(&scene, memory, constraints);
             self.points.clear();
             if kind.is_faceted {
                 self.keep_edges(&scene, memory, constraints);
@@ -126,7 +132,7 @@ impl Detector {
     }
 
     /// How far anything of the body and the obstacle may come towards each other \[m\].
-    fn farthest_reach(&self, scene: &PairScene<'_>) -> f64 {
+    pub(super) fn farthest_reach(&self, scene: &PairScene<'_>) -> f64 {
         self.reach.iter().fold(0.0, |a: f64, b| a.max(*b)) + scene.motion
     }
 
@@ -220,13 +226,14 @@ impl Detector {
     fn detect_rims(&mut self, scene: &PairScene<'_>, constraints: &mut Vec<Constraint>) {
         let surface = &scene.model.surface;
         self.edges.clear();
+        let mut parts = std::mem::take(&mut self.parts);
         for k in 0..self.near_edges.len() {
             let e = self.near_edges[k] as usize;
             let edge = &surface.edges[e];
             let ends = edge.map(|n| surface.index_of_node[n as usize] as usize);
             let reach = self.reach[ends[0]].max(self.reach[ends[1]]) + scene.motion;
             let points = ends.map(|s| self.local[s]);
-            let crossing = |inner: usize| {
+            let mut crossing = |inner: usize| {
                 let (on_face, other) = (self.nodes[ends[inner]]?, self.nodes[ends[1 - inner]]);
                 let same_face = |o: SurfacePoint| o.flat && o.normal == on_face.normal;
                 if !on_face.flat || on_face.gap > reach || other.is_some_and(same_face) {
@@ -237,7 +244,8 @@ impl Detector {
                     outward = -on_face.normal;
                 }
                 let [a, b] = [&points[inner], &points[1 - inner]];
-                let (t, found) = rim_crossing(scene.obstacle, &on_face, a, b, &outward, &scene.scales)?;
+                let (t, found) =
+                    rim_crossing(scene.obstacle, &on_face, [a, b], &outward, &scene.scales, &mut parts)?;
                 Some((if inner == 0 { t } else { 1.0 - t }, found))
             };
             // Draped over an edge of the obstacle, one edge of the body crosses two rims in one place:
@@ -255,43 +263,7 @@ impl Detector {
                 self.edges.push((e as u32, found));
             }
         }
-    }
-
-    fn detect_corners(&mut self, scene: &PairScene<'_>, constraints: &mut Vec<Constraint>) {
-        let surface = &scene.model.surface;
-        let reach = self.farthest_reach(scene);
-        let boxes = self.near.iter().map(|(_, aabb)| *aabb);
-        let near = boxes.reduce(|a, b| a.merged(&b)).unwrap_or_else(Aabb::new_invalid);
-        corners_in(scene.obstacle, &near.loosened(reach as f32), &mut self.corners);
-        self.standing.clear();
-        for (number, corner) in &self.corners {
-            let at = to_real(corner);
-            let mut best: Option<(usize, [f64; 3], SurfacePoint)> = None;
-            for (t, aabb) in &self.near {
-                if !aabb.loosened(reach as f32).contains_local_point(at) {
-                    continue;
-                }
-                let t = *t as usize;
-                let triangle = &surface.triangles[t];
-                let corners = triangle.map(|n| self.local[surface.index_of_node[n as usize] as usize]);
-                let turned = t >= surface.closed && self.looks_away(scene, triangle, &corners);
-                let [a, b, c] = corners;
-                let corners = if turned { [a, c, b] } else { corners };
-                let found = corner_on_triangle(scene.obstacle, corner, &corners, reach, &scene.scales);
-                let Some((mut weights, nearest)) = found else { continue };
-                if turned {
-                    weights.swap(1, 2);
-                }
-                if best.is_none_or(|(_, _, b)| nearest.gap.abs() < b.gap.abs()) {
-                    best = Some((t, weights, nearest));
-                }
-            }
-            if let Some((t, weights, found)) = best {
-                self.standing.push((t, found));
-                let feature = Feature::Corner(*number);
-                constraints.push(scene.constraint(surface.triangles[t], weights, &found, (feature, 0)));
-            }
-        }
+        self.parts = parts;
     }
 
     /// Whether a triangle of a sheet has to be turned over for this obstacle.

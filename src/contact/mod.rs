@@ -13,6 +13,8 @@ mod box_tree;
 mod candidates;
 mod surface_point;
 
+mod corner_contacts;
+mod mesh_rim;
 mod rim_contact;
 mod second_wall;
 mod thin_contact;

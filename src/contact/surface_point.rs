@@ -50,7 +50,7 @@ const PASSED_LINE: f64 = 0.75;
 /// Part of the largest coordinate by which a projection straight down may be beside: `f32` keeps 6e-8, a few of those.
 /// Where only the point's own coordinate counted, 1 cm from the middle of a 2 m sheet a face ended anywhere, and five of
 /// 24 cubes on the sheet's border swayed.
-const PROJECTED: f64 = 3.0e-7;
+pub(super) const PROJECTED: f64 = 3.0e-7;
 
 /// Cosine between the back of a wall and the normal that carried a node from which on it is taken for the same wall.
 const SAME_WALL: f64 = 0.9;

@@ -34,6 +34,10 @@ const LOOSE_PRODUCTS: usize = 5;
 const STILL: f64 = 0.01;
 /// Factorizations of a solve by continuation, about.
 const SOLVE: usize = 15;
+/// Numbers of W in an island of few bodies, at the most: 32 MB, and a tenth of a second for forty sweeps; 650 contacts of one body. Beyond,
+/// products go without it. A rejected step of a cloth with 10 000 contacts made 7 GB of it, in 27 s. Loads that Newton's method carries
+/// have fewer ([`LOADED_WORK`]); where most of W is empty, so that it carries more, ten times as many.
+const LARGEST_MATRIX: usize = 4_000_000;
 /// Operations to make a number of W, with a frame per body and one per node, about.
 const MAKING: [usize; 2] = [10, 40];
 /// Operations of a product per body and per contact, besides four for every number of a factor, about.
@@ -90,7 +94,9 @@ impl ContactSystem {
         let is_small = bodies.len() < CROWD;
         let has_columns = bodies.iter().enumerate().all(|(i, b)| factors.has_columns(i, b));
         let is_loose = tolerance.relative > LOOSE;
-        if !has_columns || (!is_small || is_loose) && self.products_pay(bodies, factors, is_loose) {
+        let is_large = is_small && self.is_matrix_large();
+        if !has_columns || is_large || (!is_small || is_loose) && self.products_pay(bodies, factors, is_loose)
+        {
             return self.improve_without_matrix(bodies, around);
         }
         let (is_still, has_loads) = (self.is_still(bodies, context.h), self.has_loads(context));
@@ -146,6 +152,12 @@ impl ContactSystem {
         let pairs = bodies.len() * (bodies.len() - 1) / 2;
         let product = 4 * numbers + own + PER_PAIR * pairs;
         making > if is_loose { LOOSE_PRODUCTS } else { PRODUCTS[1] } * product
+    }
+
+    fn is_matrix_large(&self) -> bool {
+        let (numbers, rows) = (self.groups.product_work(), self.lambda.len());
+        let is_dense = 4 * numbers > rows * rows;
+        numbers > if is_dense { LARGEST_MATRIX } else { 10 * LARGEST_MATRIX }
     }
 
     /// Newton's method from the forces as they are, if a factorization is cheap and the last one was not in vain.
