@@ -107,3 +107,53 @@ fn cloths_slide_over_edges_of_meshes() {
     }
     assert!(last > 1.15, "{last}");
 }
+
+/// A channel along x, `width` \[m\] wide and 0.5 m deep, one mesh of three walls in `parts` strips along it.
+fn channel(width: f64, parts: usize) -> ColliderBuilder {
+    let (mut points, mut faces) = (Vec::new(), Vec::new());
+    let z = 0.5 * width as f32;
+    for k in 0..=parts {
+        let x = 6.0 * k as f32 / parts as f32 - 3.0;
+        points.extend([(0.5, -z), (0.0, -z), (0.0, z), (0.5, z)].map(|(y, z)| Vector::new(x, y, z)));
+    }
+    for k in 0..parts as u32 {
+        for i in [4 * k, 4 * k + 1, 4 * k + 2] {
+            faces.extend([[i, i + 1, i + 4], [i + 1, i + 5, i + 4]]);
+        }
+    }
+    ColliderBuilder::trimesh(points, faces).unwrap().friction(0.1)
+}
+
+/// Ropes fall to the bottom of channels, wide ones and one that they just fit, and on the way they keep to their walls. Between two walls
+/// nearer than the way that friction takes in a step, a tenth of it here, what is thrown aside is not tried: it hangs there.
+#[test]
+fn ropes_lie_at_the_bottom_of_channels() {
+    for (width, speeds) in
+        [(0.021, &[0.0][..]), (0.025, &[0.0, 1.0]), (0.04, &[0.0, 1.0]), (0.1, &[0.0, 1.0])]
+    {
+        for parts in [1, 37] {
+            for dt in [1.0 / 240.0, 1.0 / 60.0, 1.0 / 30.0] {
+                for &aside in speeds {
+                    let clearance = 0.5 * width - RADIUS;
+                    let body = rope(0.4 * clearance as f32, 0.3).linvel(Vector::new(0.0, -1.0, aside));
+                    let mut physics = PhysicsWorld::new();
+                    physics.integration_parameters.dt = dt;
+                    physics.insert(RigidBodyBuilder::fixed(), channel(width, parts));
+                    let mut world = DeformableWorld::new();
+                    let body = world.insert(body).unwrap();
+                    let mut widest: f64 = 0.0;
+                    for _ in 0..(3.0 / dt) as usize {
+                        world.step(&mut physics);
+                        let aside = world.bodies[body].positions().map(|p| f64::from(p.z.abs()));
+                        widest = aside.fold(widest, f64::max);
+                    }
+                    let what = format!("{width} m, {parts} strips, {dt} s, {aside} m/s");
+                    let off = |p: Vector| (f64::from(p.y) / RADIUS - 1.0).abs();
+                    let off = world.bodies[body].positions().map(off).fold(0.0, f64::max);
+                    assert!(off < 1e-3, "{what}: off the bottom by {off} of its radius");
+                    assert!(widest < clearance + 1e-5, "{what}: {widest} m aside of {clearance}");
+                }
+            }
+        }
+    }
+}

@@ -35,7 +35,7 @@ pub(crate) struct ObstacleContact {
     /// Part of a compound.
     pub part: u32,
     pub feature: Feature,
-    /// Which of the contacts on one feature: 0 of a node, a rim or a corner, 1 of a thin node with a second wall of a mesh; from 1 on
+    /// Which of the contacts on one feature: 0 of a node, a rim or a corner, 1 and 2 of a thin node with other walls of a mesh; from 1 on
     /// closest points, of which curved surfaces have several.
     pub slot: u32,
 }

@@ -5,11 +5,11 @@ use super::corner_contacts::StandingCorner;
 use super::obstacle::Obstacle;
 use super::pair_scene::{Pair, PairScene, near, one_constraint_per_feature};
 use super::rim_contact::rim_crossing;
-use super::second_wall::{carried_wall, walls_at};
 use super::shape_table::Solidity;
 use super::surface_point::{SurfacePoint, surface_point};
 use super::surface_tree::ROUNDING;
 use super::thin_contact::{looks_away, side_of_node};
+use super::walls::{carried_wall, walls_at};
 use crate::body::{ConstraintMemory, Feature};
 use crate::fem::DeformableModel;
 use crate::math::{Vec3, from_real, to_real};
@@ -214,10 +214,12 @@ impl Detector {
             if let Some(found) = self.nodes[s].filter(|f| f.gap < reach) {
                 let walls = match surface.is_thin[s] {
                     true => walls_at(scene, nodes[s], &p, found, reach, memory),
-                    false => [(0, Some(found)), (1, None)],
+                    false => [Some(found), None, None],
                 };
-                for (slot, found) in walls.iter().filter_map(|(slot, found)| Some((slot, found.as_ref()?))) {
-                    constraints.push(scene.node_constraint(nodes[s], *slot, found));
+                for (slot, found) in
+                    (0..).zip(&walls).filter_map(|(slot, found)| Some((slot, found.as_ref()?)))
+                {
+                    constraints.push(scene.node_constraint(nodes[s], slot, found));
                 }
             }
         }

@@ -16,9 +16,9 @@ mod surface_point;
 mod corner_contacts;
 mod mesh_rim;
 mod rim_contact;
-mod second_wall;
 mod thin_contact;
 mod triangle_contact;
+mod walls;
 
 mod pair_scene;
 

@@ -23,6 +23,13 @@ pub(crate) struct SurfacePoint {
     pub flat: bool,
 }
 
+impl SurfacePoint {
+    /// The same wall from the side on which the node is, if it is not what it counts as having passed.
+    pub fn seen_from_node(self) -> Self {
+        if self.gap < 0.0 { Self { normal: -self.normal, gap: -self.gap, ..self } } else { self }
+    }
+}
+
 /// What decides which of the normals is used, in the obstacle's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scales {
