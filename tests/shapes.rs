@@ -76,6 +76,22 @@ fn flat_topped_shapes_carry_a_cube() {
     }
 }
 
+/// Also of what has points of contact only as a mesh, made of it.
+#[test]
+fn a_compound_of_one_part_is_that_part() {
+    // Knolls of 7 cm, 12 cm apart, under cells of 7 cm.
+    let knolls = (0..33 * 33).map(|k| if k % 2 == 0 { 0.07 } else { 0.0 });
+    let field = SharedShape::heightfield(Array2::new(33, 33, knolls.collect()), Vector::new(2.0, 1.0, 2.0));
+    let posts: Vec<IVector> = (0..64).map(|k| IVector::new(2 * (k % 8) - 8, -1, 2 * (k / 8) - 8)).collect();
+    let posts = SharedShape::voxels(Vector::splat(0.06), &posts);
+    for (name, shape) in [("heightfield", field), ("voxels", posts)] {
+        let whole = settle(ColliderBuilder::new(shape.clone()));
+        let part = settle(ColliderBuilder::compound(vec![(Pose::IDENTITY, shape)]));
+        println!("{name}: {whole:?}, {part:?}");
+        assert_eq!(whole, part, "{name}");
+    }
+}
+
 #[test]
 fn round_topped_shapes_carry_a_cube() {
     let down = |b: ColliderBuilder, y: f32| b.translation(Vector::Y * -y);

@@ -160,22 +160,28 @@ impl RapierScene {
         start: Pose64,
         end: Pose64,
     ) {
-        let (shape, corners) = self.meshes.mesh_of(shape);
-        let mut push = |shape: SharedShape, part: u32, start: Pose64, end: Pose64| {
-            self.colliders.push(handle);
-            let names = (proxy, packed(handle.into_raw_parts()), part);
-            let obstacle = Obstacle::new(names, shape, [start, end]).with_corners(corners.clone());
-            self.obstacles.push(obstacle);
+        let TypedShape::Compound(compound) = shape.as_typed_shape() else {
+            return self.push_part(handle, (proxy, 0), shape, [start, end]);
         };
-        match shape.as_typed_shape() {
-            TypedShape::Compound(compound) => {
-                for (part, (offset, shape)) in compound.shapes().iter().enumerate() {
-                    let offset = Pose64::from_real(offset);
-                    push(shape.clone(), part as u32, start.compose(&offset), end.compose(&offset));
-                }
-            }
-            _ => push(shape, 0, start, end),
+        for (part, (offset, shape)) in (0..).zip(compound.shapes()) {
+            let offset = Pose64::from_real(offset);
+            let poses = [start.compose(&offset), end.compose(&offset)];
+            self.push_part(handle, (proxy, part), shape.clone(), poses);
         }
+    }
+
+    /// A part of a compound, or the whole of another shape.
+    fn push_part(
+        &mut self,
+        handle: ColliderHandle,
+        (proxy, part): (ProxyId, u32),
+        shape: SharedShape,
+        poses: [Pose64; 2],
+    ) {
+        let (shape, corners) = self.meshes.mesh_of(shape);
+        let names = (proxy, packed(handle.into_raw_parts()), part);
+        self.colliders.push(handle);
+        self.obstacles.push(Obstacle::new(names, shape, poses).with_corners(corners));
     }
 }
 
