@@ -6,7 +6,7 @@ use super::obstacle::Obstacle;
 use super::pair_scene::PairScene;
 use super::shape_table::{Corners, Solidity};
 use super::surface_point::{Scales, SurfacePoint};
-use super::triangle_contact::barycentric;
+use super::triangle_contact::{barycentric, normal_of};
 use crate::body::{ConstraintKey, ConstraintMemory, Feature, ObstacleContact};
 use crate::math::{Vec3, from_real, to_real};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
@@ -171,7 +171,7 @@ fn corner_on_triangle(
     reach: f64,
     scales: &Scales,
 ) -> Option<([f64; 3], SurfacePoint)> {
-    let outward = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).try_normalize(0.0)?;
+    let outward = normal_of(corners)?;
     let gap = outward.dot(&(corner - corners[0]));
     if gap > reach || gap < -2.0 * scales.shift {
         return None;
@@ -192,24 +192,17 @@ fn leads_out(obstacle: &Obstacle, corner: &Vec3, normal: &Vec3, scales: &Scales)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::ProxyId;
-    use crate::math::{Mat3, Pose64};
     use parry3d::shape::SharedShape;
     use proptest::prelude::*;
 
     const SCALES: Scales = Scales { band: 1e-5, shift: 0.01, extent: 0.0, middle: Vec3::new(0.0, 1.0, 0.0) };
-
-    fn obstacle(shape: SharedShape) -> Obstacle {
-        let start = Pose64 { rotation: Mat3::identity(), translation: Vec3::zeros() };
-        Obstacle::new((ProxyId(0), 0, 0), shape, [start, start])
-    }
 
     proptest! {
         /// A box stands, a little tilted, on a film thinner than what tells inside from outside: on its upper side
         /// only.
         #[test]
         fn corners_do_not_stand_on_the_back_of_a_film(tilt in -0.2f64..0.2, turn in 0.0..7.0f64, thickness in 0.0..0.018, half in 0.02..0.5f32) {
-            let cuboid = obstacle(SharedShape::cuboid(0.5, half, 0.5));
+            let cuboid = Obstacle::at_origin(SharedShape::cuboid(0.5, half, 0.5));
             let corner = Vec3::new(0.5, -f64::from(half), -0.5);
             let up = Vec3::new(tilt * f64::cos(turn), 1.0, tilt * f64::sin(turn)).normalize();
             let [u, v] = crate::math::tangents(&up);

@@ -4,6 +4,7 @@
 //! of other shapes and in valleys, took half of the detection of a cloth on hills.
 
 use super::surface_point::{PROJECTED, Scales, SurfacePoint};
+use super::triangle_contact::normal_of;
 use crate::math::{Vec3, from_real, to_real};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::shape::TriMesh;
@@ -106,16 +107,11 @@ impl OverPlane<'_> {
     }
 }
 
-fn normal_of([a, b, c]: &[Vec3; 3]) -> Option<Vec3> {
-    (b - a).cross(&(c - a)).try_normalize(0.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::Obstacle;
     use crate::contact::surface_point::{is_over_face, surface_point};
-    use crate::contact::{Obstacle, ProxyId};
-    use crate::math::{Mat3, Pose64};
     use parry3d::math::Vector;
     use parry3d::shape::SharedShape;
     use proptest::prelude::*;
@@ -146,8 +142,7 @@ mod tests {
             cells in 1u32..6, angle in -1.4f32..-0.2, from in [-0.49..0.49f64, -0.49..0.49f64], to in [-0.7..0.7f64, -0.7..0.7f64],
         ) {
             let shape = table(cells, angle);
-            let start = Pose64 { rotation: Mat3::identity(), translation: Vec3::zeros() };
-            let obstacle = Obstacle::new((ProxyId(0), 0, 0), shape.clone(), [start, start]);
+            let obstacle = Obstacle::at_origin(shape.clone());
             let [inner, outer] = [from, to].map(|[x, z]| Vec3::new(x, 1e-3, z));
             let on_face = surface_point(&obstacle, &inner, &-Vec3::y(), &SCALES).unwrap();
             let found = leaves_face(shape.as_trimesh().unwrap(), &on_face, [&inner, &outer], &SCALES, &mut Vec::new());
@@ -161,8 +156,7 @@ mod tests {
             heights in [0.0..5e-3f64, 0.0..5e-3f64],
         ) {
             let shape = table(cells, angle);
-            let start = Pose64 { rotation: Mat3::identity(), translation: Vec3::zeros() };
-            let obstacle = Obstacle::new((ProxyId(0), 0, 0), shape.clone(), [start, start]);
+            let obstacle = Obstacle::at_origin(shape.clone());
             let (inner, outer) = (Vec3::new(from[0], heights[0], from[1]), Vec3::new(to[0], heights[1], to[1]));
             let on_face = surface_point(&obstacle, &(inner + Vec3::y() * 1e-3), &-Vec3::y(), &SCALES).unwrap();
             prop_assume!(on_face.flat);

@@ -37,6 +37,13 @@ impl Obstacle {
         Self { proxy, key, part, shape, start, end, kind, corners: None }
     }
 
+    /// One that stands at the origin, for tests.
+    #[cfg(test)]
+    pub fn at_origin(shape: SharedShape) -> Self {
+        let here = Pose64::from_real(&parry3d::math::Pose::IDENTITY);
+        Self::new((ProxyId(0), 0, 0), shape, [here, here])
+    }
+
     /// The same, with the vertices of its mesh that are corners, ascending.
     pub fn with_corners(mut self, corners: Option<Arc<[u32]>>) -> Self {
         self.corners = corners;

@@ -98,24 +98,17 @@ fn across_both(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::ProxyId;
-    use crate::math::{Mat3, Pose64};
     use parry3d::shape::SharedShape;
     use proptest::prelude::*;
 
     const SCALES: Scales = Scales { band: 1e-5, shift: 0.01, extent: 0.0, middle: Vec3::new(0.0, 1.0, 0.0) };
-
-    fn obstacle(shape: SharedShape) -> Obstacle {
-        let start = Pose64 { rotation: Mat3::identity(), translation: Vec3::zeros() };
-        Obstacle::new((ProxyId(0), 0, 0), shape, [start, start])
-    }
 
     proptest! {
         /// A body edge lies over an edge of a box, sloping by any angle: its contact is across both, at their distance,
         /// whichever of its ends comes first.
         #[test]
         fn edges_over_edges_push_across_both(angle in 0.1..1.4f64, along in -2.0..2.0f64, gap in -2e-3..2e-3f64, place in 0.3..0.7f64) {
-            let cuboid = obstacle(SharedShape::cuboid(0.5, 0.4, 0.5));
+            let cuboid = Obstacle::at_origin(SharedShape::cuboid(0.5, 0.4, 0.5));
             let normal = Vec3::new(angle.sin(), angle.cos(), 0.0);
             let direction = Vec3::new(angle.cos(), -angle.sin(), along).normalize();
             let normal = (normal - direction * direction.dot(&normal)).normalize();

@@ -253,15 +253,8 @@ impl Projection {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::ProxyId;
-    use crate::math::{Mat3, Pose64};
     use parry3d::math::Vector;
     use parry3d::shape::SharedShape;
-
-    fn obstacle(shape: SharedShape) -> Obstacle {
-        let start = Pose64 { rotation: Mat3::identity(), translation: Vec3::zeros() };
-        Obstacle::new((ProxyId(0), 0, 0), shape, [start, start])
-    }
 
     const SCALES: Scales = Scales { band: 4e-5, shift: 0.01, extent: 0.0, middle: Vec3::new(0.0, 1.0, 0.0) };
 
@@ -285,7 +278,7 @@ mod tests {
         ];
         for shape in shapes {
             let kind = shape.shape_type();
-            let obstacle = obstacle(shape);
+            let obstacle = Obstacle::at_origin(shape);
             // The surface below a point a little off the axis, from far outside.
             let outward = -Vec3::y();
             // A cone is approached on its flank, away from its tip.
@@ -314,7 +307,7 @@ mod tests {
 
     #[test]
     fn just_inside_an_edge_the_face_towards_the_body_is_taken() {
-        let obstacle = obstacle(SharedShape::cuboid(0.5, 0.5, 0.5));
+        let obstacle = Obstacle::at_origin(SharedShape::cuboid(0.5, 0.5, 0.5));
         // A body on top, its rim in line with the box: nearest is the side face.
         for x in [0.5 - 1e-7, 0.5, 0.5 + 1e-7] {
             let rim = Vec3::new(1.0, -1.0, 0.0).normalize();
@@ -330,7 +323,7 @@ mod tests {
             vec![Vector::new(-1.0, 0.0, -1.0), Vector::new(1.0, 0.0, -1.0), Vector::new(0.0, 0.0, 1.0)];
         for triangle in [[0, 1, 2], [0, 2, 1]] {
             let mesh = SharedShape::trimesh(vertices.clone(), vec![triangle]).unwrap();
-            let obstacle = obstacle(mesh);
+            let obstacle = Obstacle::at_origin(mesh);
             for (side, depth) in [(1.0, 1e-3), (1.0, 0.0), (1.0, -1e-3), (-1.0, 1e-3), (-1.0, -1e-3)] {
                 let p = Vec3::new(0.05, side * depth, 0.02);
                 let scales = Scales { middle: Vec3::y() * side, ..SCALES };

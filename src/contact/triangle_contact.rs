@@ -91,7 +91,7 @@ struct Shifted {
 
 impl Shifted {
     fn new(corners: &[Vec3; 3], scales: &Scales) -> Option<Self> {
-        let outward = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).try_normalize(0.0)?;
+        let outward = normal_of(corners)?;
         Some(Self { corners: corners.map(|c| c - outward * scales.shift), outward })
     }
 
@@ -123,6 +123,11 @@ impl Shifted {
 
 fn at(corners: &[Vec3; 3], weights: &[f64; 3]) -> Vec3 {
     corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
+}
+
+/// Unit normal of a triangle, by the order of its corners; `None` if it has shrunk to nothing.
+pub(crate) fn normal_of([a, b, c]: &[Vec3; 3]) -> Option<Vec3> {
+    (b - a).cross(&(c - a)).try_normalize(0.0)
 }
 
 /// Weights of the corners at the foot of `p` in the plane of a triangle.

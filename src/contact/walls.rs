@@ -5,14 +5,14 @@ use super::pair_scene::PairScene;
 use super::shape_table::Solidity;
 use super::surface_point::{SurfacePoint, carried_point};
 use super::thin_contact::carried_normals;
-use super::triangle_contact::barycentric;
+use super::triangle_contact::{barycentric, normal_of};
 use crate::body::ConstraintMemory;
 use crate::math::{Vec3, from_real, to_real};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::shape::TriMesh;
 
 /// Walls that a node touches, at the most: more than three planes through a point are not needed to hold it.
-pub(super) const MOST_WALLS: usize = 3;
+const MOST_WALLS: usize = 3;
 /// Cosine beyond which two faces push the same way: a floor of flat squares and low hills has no second wall.
 const PARALLEL: f64 = 0.9;
 /// By how much, in parts of a face, a foot may miss the face: rounding. The side face of a box is beside that of a sheet on its top by
@@ -143,7 +143,7 @@ impl<'a> NearMesh<'a> {
         self.mesh.bvh().intersect_aabb(&self.region).filter_map(|t| {
             let triangle = self.mesh.triangle(t);
             let corners = [triangle.a, triangle.b, triangle.c].map(from_real);
-            let face = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).try_normalize(0.0)?;
+            let face = normal_of(&corners)?;
             let is_over = barycentric(&corners, self.p)?.iter().all(|w| *w > -MISS);
             is_over.then(|| (face, face.dot(&(self.p - corners[0]))))
         })
