@@ -4,6 +4,7 @@ mod common;
 use common::thin::*;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
+use rayon::prelude::*;
 
 /// Top of the table, and of the things \[m\].
 const TOP: f64 = -0.3;
@@ -19,11 +20,20 @@ struct Drape {
 }
 
 /// Part of the steps of three seconds that were rejected, and where the lowest vertex is then \[m\].
-fn drape(drape: Drape, on: ColliderBuilder, solved: Option<SolverSettings>) -> (f64, f64) {
-    let Drape { cells, e, dt } = drape;
+fn drape(scene: Drape, on: ColliderBuilder, solved: Option<SolverSettings>) -> (f64, f64) {
+    drape_on(scene, RigidBodyBuilder::fixed(), on, solved)
+}
+
+fn drape_on(
+    scene: Drape,
+    moved: RigidBodyBuilder,
+    on: ColliderBuilder,
+    solved: Option<SolverSettings>,
+) -> (f64, f64) {
+    let Drape { cells, e, dt } = scene;
     let mut physics = PhysicsWorld::new();
     physics.integration_parameters.dt = dt;
-    physics.insert_collider(on.friction(0.5), None);
+    physics.insert(moved, on.friction(0.5));
     let mut world = DeformableWorld::new();
     let cloth = DeformableBodyBuilder::cloth([0.5, 0.5], [cells; 2], 5e-4)
         .material(DeformableMaterial::new(e, 0.3).density(400.0).mass_damping(1.0))
@@ -84,10 +94,6 @@ fn cloths_lie_down_with_few_rejected_steps() {
     ];
     for (name, thing) in things {
         for (e, dt) in [(1e4, 1.0 / 60.0), (1e6, 1.0 / 60.0), (1e7, 1.0 / 60.0), (1e6, 1.0 / 20.0)] {
-            // At 1/20 s 8 % are on hills, and most of what comes down flat on a floor and lies there.
-            if name != "ball" && dt > 0.02 {
-                continue;
-            }
             let scene = Drape { cells: 20, e, dt };
             let (rejected, lowest) = drape(scene, thing.clone(), None);
             println!(
@@ -96,5 +102,43 @@ fn cloths_lie_down_with_few_rejected_steps() {
             );
             assert!(rejected < 0.04, "{name}, {scene:?}: {rejected}");
         }
+    }
+}
+
+/// As [`tablecloths_come_down`], of all sizes. Once seven stayed on the table as boards. Cloth of 1e9 Pa is stiff: it hangs down by 6 cm.
+#[test]
+#[ignore = "slow tier"]
+fn nearly_all_tablecloths_come_down() {
+    let all = [16, 20, 24].into_iter().flat_map(|cells| [1e6, 1e7, 1e8, 1e9].map(|e| (cells, e)));
+    let all = all.flat_map(|(cells, e)| [60.0f32, 30.0, 20.0].map(|rate| Drape { cells, e, dt: 1.0 / rate }));
+    let all: Vec<Drape> = all.collect();
+    let found: Vec<(f64, f64)> = all.par_iter().map(|scene| drape(*scene, table(), None)).collect();
+    for (scene, (rejected, lowest)) in all.iter().zip(&found) {
+        println!("{scene:?}: {:.1} % rejected, down to {lowest:.3} m", rejected * 1e2);
+    }
+    let boards = found.iter().filter(|(_, lowest)| *lowest > TOP - 0.03).count();
+    let rejected = found.iter().map(|(rejected, _)| rejected).sum::<f64>() / all.len() as f64;
+    println!("{boards} of {} stay, {:.1} % of the steps rejected", all.len(), rejected * 1e2);
+    assert!(boards <= 3 && rejected < 0.12, "{boards} {rejected}");
+}
+
+/// That turn by 1 and 3 rad/s and slide by 0.3 and 1 m/s. Once the steps of two were rejected again and again.
+#[test]
+#[ignore = "slow tier"]
+fn tablecloths_come_down_on_tables_that_move() {
+    let ways = [(1.0f32, 0.0f32), (3.0, 0.0), (0.0, 0.3), (0.0, 1.0)];
+    let all = ways.into_iter().flat_map(|way| [1e6, 1e8].map(|e| (way, e)));
+    let all: Vec<_> = all.flat_map(|(way, e)| [60.0f32, 30.0].map(|rate| (way, e, 1.0 / rate))).collect();
+    let found: Vec<(f64, f64)> = all
+        .par_iter()
+        .map(|&((spin, slide), e, dt)| {
+            let moved = RigidBodyBuilder::kinematic_velocity_based();
+            let moved = moved.angvel(Vector::Y * spin).linvel(Vector::X * slide);
+            drape_on(Drape { cells: 20, e, dt }, moved, table(), None)
+        })
+        .collect();
+    for (scene, (rejected, lowest)) in all.iter().zip(&found) {
+        println!("{scene:?}: {:.1} % rejected, down to {lowest:.3} m", rejected * 1e2);
+        assert!(*rejected < 0.3 && *lowest < TOP - 0.13, "{scene:?}: {rejected}, {lowest} m");
     }
 }

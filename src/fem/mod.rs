@@ -4,6 +4,7 @@
 
 mod cavities;
 mod elements;
+mod flat_bends;
 mod patches;
 mod regions;
 mod rigid_regions;

@@ -2,6 +2,7 @@
 
 use super::cavities::{Cavity, DeformableCavity, cavities};
 use super::elements::{ElementBlock, TriangleElement};
+use super::flat_bends::FlatBends;
 use super::regions::{Region, VolumeShares, blocks, set_ranges};
 use super::smoothing::SmoothingDomains;
 use super::stencils::Stencils;
@@ -9,8 +10,8 @@ use super::thin_structure::ThinElements;
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
 use crate::mesh::{MeshError, Structure, Surface, TetMesh, sweep_order};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// Everything about a body that its motion and its material do not change. Made once per mesh and
 /// shared by all bodies of that shape through an [`Arc`](std::sync::Arc): they also share factors.
@@ -33,6 +34,8 @@ pub struct DeformableModel {
     pub(crate) triangles: Vec<TriangleElement>,
     /// What keeps lengths: springs, rods, bends of sheets, muscle fibres.
     pub(crate) stencils: Stencils,
+    /// Made when it is first asked for.
+    flat_bends: OnceLock<FlatBends>,
     /// Distance of the surface from each node \[m\]: half the thickness of a sheet, the radius of a rod.
     pub(crate) half_thickness: Vec<f64>,
     /// Each node's share of the volume of the elements around it: a quarter of a tetrahedron's \[m³\].
@@ -184,6 +187,7 @@ impl DeformableModel {
             domains: SmoothingDomains::default(),
             volume_domains: SmoothingDomains::default(),
             triangles: thin.triangles,
+            flat_bends: OnceLock::new(),
             stencils: thin.stencils,
             half_thickness: thin.half_thickness,
             tetrahedra,
@@ -296,6 +300,11 @@ impl DeformableModel {
         self.rods.iter().map(|nodes| &nodes[..])
     }
 
+    /// The bends of flat sheets, summed up.
+    pub(super) fn flat_bends(&self) -> &FlatBends {
+        self.flat_bends.get_or_init(|| FlatBends::new(&self.stencils, &self.coupling))
+    }
+
     /// Number of rods.
     pub fn rod_count(&self) -> usize {
         self.rods.len()
@@ -309,6 +318,7 @@ impl DeformableModel {
             + size_of_val(&self.blocks[..])
             + size_of_val(&self.triangles[..])
             + self.stencils.bytes()
+            + self.flat_bends.get().map_or(0, FlatBends::bytes)
             + 2 * size_of_val(&self.node_volumes[..])
             + self.adjacency.iter().chain(&self.coupling).map(|a| 24 + 4 * a.len()).sum::<usize>()
             + self.domains.bytes()

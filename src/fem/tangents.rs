@@ -1,5 +1,6 @@
 //! Stiffness of a body's elements at a state, block by block, as Newton's method wants it.
 
+use super::flat_bends::is_flat_bend;
 use super::model::Elements;
 use super::solid_elements::SolidElement;
 use super::thin_elements::{length_energy, membrane};
@@ -39,7 +40,7 @@ pub(crate) fn add_tangents(
         let weights = modes.map(|m| kept(m.stiffness) * scale);
         add_products(&triangle.nodes, &weights, sides, &mut add);
     }
-    for stencil in model.stencils.iter() {
+    for stencil in model.stencils.iter().filter(|stencil| !is_flat_bend(stencil)) {
         let stiffening = stencil.mean(|region| stiffening(&materials[region as usize]));
         let mut K = length_energy(&stencil, materials, activations).tangent(&stencil.vector(x)) * stiffening;
         if projected {
@@ -51,6 +52,7 @@ pub(crate) fn add_tangents(
             }
         }
     }
+    model.flat_bends().add_blocks(materials, stiffening, add);
 }
 
 /// The blocks `Σ_k w_k u_k,a u_k,bᵀ` of an element with the modes' sides u, mode by mode.
@@ -102,7 +104,17 @@ mod tests {
         let arch: Vec<[f64; 3]> =
             [-0.2, 0.0, 0.2].iter().flat_map(|&z| [-0.2, 0.1].map(|x: f64| [x, x * x + z * z, z])).collect();
         let shell = Structure::sheet(arch, &[[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]], 0.01);
+        // Flat, of triangles that differ, over half of it in another region.
+        let plane: Vec<[f64; 3]> = (0..9)
+            .map(|k| {
+                [0.2 * f64::from(k % 3) - 0.15, 0.0, 0.03 * f64::from(k * k % 5) + 0.1 * f64::from(k / 3)]
+            })
+            .collect();
+        let faces: Vec<[u32; 3]> =
+            [0, 1, 3, 4].into_iter().flat_map(|k| [[k, k + 3, k + 1], [k + 1, k + 3, k + 4]]).collect();
+        let flat = Structure::sheet(plane, &faces, 0.02);
         let whole = [
+            DeformableModel::from_structure(&flat.unwrap()).unwrap(),
             DeformableModel::new(&block).smoothed(),
             DeformableModel::from_structure(&mixed).unwrap().with_fibres(|_| [1.0, 0.5, 0.0]),
             DeformableModel::from_structure(&shell.unwrap()).unwrap(),

@@ -32,7 +32,7 @@ fn modulus(stencil: &Stencil<'_>, materials: &[DeformableMaterial]) -> f64 {
 }
 
 /// Of a plate `D/2·((1 + ν)/2·(κ₁₁ + κ₂₂)² + (1 − ν)/2·((κ₁₁ − κ₂₂)² + 4 κ₁₂²))` per area, `D = E t³/12(1 − ν²)`.
-fn modulus_of(kind: StencilKind, material: &DeformableMaterial) -> f64 {
+pub(super) fn modulus_of(kind: StencilKind, material: &DeformableMaterial) -> f64 {
     let nu = material.poisson_ratio;
     match kind {
         StencilKind::Stretch | StencilKind::RodBending => material.youngs_modulus,

@@ -10,6 +10,8 @@ const FALLBACK_ROUNDS: usize = 4;
 const WEAKER: [f64; 5] = [0.5, 0.5, 0.5, 0.5, 0.0];
 /// Part of the work that forces carry from one thing to another which they may make.
 const MADE_OF_EXCHANGED: f64 = 1.0e-3;
+/// Part of a body's energy that a rejected one beside it may make before that is rejected too.
+const MADE_OF_OWN: f64 = 0.5;
 
 impl Island {
     /// Bodies whose step is far from solved and would gain energy are rejected: where forces change wildly from iteration
@@ -17,8 +19,12 @@ impl Island {
     pub fn reject_steps_that_gain_energy(&mut self, context: &SolveContext<'_>) {
         loop {
             let mut gains = false;
+            let givers = self.rejected_that_make_energy(context);
             for index in 0..self.bodies.len() {
-                if self.would_be_rejected(index, context) || self.is_forced_while_caught(index, context) {
+                if self.would_be_rejected(index, context)
+                    || self.is_forced_while_caught(index, context)
+                    || self.is_moved_by(&givers, index)
+                {
                     self.bodies[index].is_rejected = true;
                     gains = true;
                 }
@@ -28,6 +34,30 @@ impl Island {
             }
             self.step_rigid_fallbacks(context);
         }
+    }
+
+    /// Rejected bodies that do not move, as rigid ones, by what their contacts take from them: where these turn one far, or others hold it
+    /// between them. What it touches would have what it has not lost: a rope of 6 g in a film of 1e3 Pa, at 1/10 s, gave that 0.4 J, twice what
+    /// both had.
+    fn rejected_that_make_energy(&mut self, context: &SolveContext<'_>) -> Vec<(usize, f64)> {
+        let rejected = (0..self.bodies.len()).filter(|index| self.bodies[*index].is_rejected);
+        let rejected: Vec<usize> = rejected.collect();
+        let made = |index: usize| {
+            let by_contacts = self.contacts.work_of(index, &self.bodies, context)[0];
+            (index, self.bodies[index].energy_made(by_contacts.max(0.0))[0])
+        };
+        rejected.into_iter().map(made).filter(|(_, made)| *made > 0.0).collect()
+    }
+
+    /// Whether a rejected body, with the energy \[J\] that it makes, touches one that is not and had little beside that.
+    fn is_moved_by(&mut self, givers: &[(usize, f64)], index: usize) -> bool {
+        if self.bodies[index].is_rejected || givers.is_empty() {
+            return false;
+        }
+        let [_, had] = self.bodies[index].energy_made(0.0);
+        givers
+            .iter()
+            .any(|(giver, made)| *made > MADE_OF_OWN * had && self.contacts.act_between(*giver, index))
     }
 
     /// Whether contacts have put energy into what is caught: without a way out none does, unless it is far from where they were solved.
@@ -41,8 +71,11 @@ impl Island {
 
     pub(super) fn would_be_rejected(&mut self, index: usize, context: &SolveContext<'_>) -> bool {
         let body = &self.bodies[index];
-        let is_solved =
-            !self.contacts.is_far_from_solved() && body.residual() <= FAR_FROM_SOLVED * body.force_scale();
+        // What is done again is better than a rigid motion if it makes no energy, and not if it does: a rod of 1e9 Pa at 100 m/s, against a
+        // rope at 1/1000 s, made a sixth of that of the impact.
+        let is_solved = !body.has_constant_matrix
+            && !self.contacts.is_far_from_solved()
+            && body.residual() <= FAR_FROM_SOLVED * body.force_scale();
         !is_solved && self.would_gain_energy(index, 0.0, context)
     }
 

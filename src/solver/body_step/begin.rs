@@ -50,6 +50,7 @@ impl BodyProblem {
             step_damping: 1.0,
             guard_retries: 0,
             is_rejected: false,
+            has_constant_matrix: false,
             was_redone: false,
             is_attached: false,
             held_nodes: Vec::new(),
@@ -130,6 +131,7 @@ impl BodyProblem {
         self.step_damping = self.scale;
         self.guard_retries = 0;
         self.is_rejected = false;
+        self.has_constant_matrix = false;
         self.was_redone = false;
         self.begin_limits();
         self.kinetic_bound = f64::INFINITY;

@@ -8,7 +8,7 @@ use crate::fem::SystemMatrix;
 use crate::mesh::Surface;
 use crate::solver::linear::{
     CoarseInverse, ComplianceColumns, Factor, FactorCache, FactorScratch, MatrixValues, Symbolic,
-    SystemFactor, TangentPlace, assemble_tangent, columns_pay,
+    SystemFactor, TangentPlace, assemble_constant, assemble_tangent, columns_pay,
 };
 use std::sync::Arc;
 
@@ -54,6 +54,8 @@ struct OwnFactor {
     factor: SystemFactor,
     /// All columns that its contacts want are there.
     has_columns: bool,
+    /// Of the constant matrix.
+    is_constant: bool,
 }
 
 /// A factor without numbers.
@@ -110,6 +112,9 @@ impl NewtonFactors {
             if body.settings.solver != Solver::Newton {
                 continue;
             }
+            if body.has_constant_matrix && self.made[index].as_ref().is_some_and(|made| made.is_constant) {
+                continue;
+            }
             some = true;
             body.step_damping = body.scale;
             self.forget(index);
@@ -158,7 +163,7 @@ impl NewtonFactors {
             columns.prepare(&body.model, pins, symbolic, factor, wanted, &mut self.scratch);
         }
         self.wanted = wanted;
-        Some(OwnFactor { factor, has_columns })
+        Some(OwnFactor { factor, has_columns, is_constant: body.has_constant_matrix })
     }
 
     /// Sets the numbers of the factor of a body's Hessian; false if it is not positive definite.
@@ -169,6 +174,10 @@ impl NewtonFactors {
         symbolic: &Symbolic,
         numbers: &mut Vec<f64>,
     ) -> bool {
+        if body.has_constant_matrix {
+            assemble_constant(&body.elements(), (&body.key.pins, body.h()), symbolic, &mut self.matrix);
+            return symbolic.factorize_into(numbers, &self.matrix.values, &mut self.scratch).is_ok();
+        }
         let place = TangentPlace { x: &body.current.x, projected, pins: &body.key.pins, h: body.h() };
         assemble_tangent(&body.elements(), &place, symbolic, &mut self.matrix);
         symbolic.factorize_into(numbers, &self.matrix.values, &mut self.scratch).is_ok()

@@ -102,6 +102,8 @@ pub(crate) struct BodyProblem {
     pub guard_retries: usize,
     /// The step would have made energy: the body falls back to a rigid motion.
     pub is_rejected: bool,
+    /// Newton's method has the constant matrix in the place of the Hessian, and is accelerated.
+    pub has_constant_matrix: bool,
     /// Generalized-α would have made energy: implicit Euler took its place.
     pub was_redone: bool,
     /// Cables hold it, or attachments that give way or lead to what does not yield or deforms.

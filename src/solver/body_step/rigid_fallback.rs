@@ -24,6 +24,13 @@ impl BodyProblem {
     /// into it, and `besides` \[J\] that others have gained. An implicit Euler step of a convex energy only ever
     /// takes some [cf. Hairer et al. 2006].
     pub fn gains_energy(&mut self, besides: f64) -> bool {
+        let [made, _] = self.energy_made(besides);
+        // Written so that NaN counts as gained.
+        !(made <= 0.0)
+    }
+
+    /// Energy \[J\] that the step makes beyond what it may, and that the body had at the start.
+    pub fn energy_made(&mut self, besides: f64) -> [f64; 2] {
         let mut still = std::mem::take(&mut self.trial);
         still.x.clone_from(&self.x_start);
         self.evaluate(&mut still, f64::INFINITY);
@@ -55,8 +62,7 @@ impl BodyProblem {
         let iterations = if self.is_xpbd() { 1.0 } else { self.settings.max_iterations.max(1) as f64 };
         let share = MAX_GAIN / iterations;
         let allowed = share * (before + kinetic) + MAX_GAIN_OF_WORK * by_contact.abs();
-        // Written so that NaN counts as gained.
-        !(gained + besides <= allowed)
+        [gained + besides - allowed, before + kinetic]
     }
 
     /// Energy \[J\] that it takes to put nodes elsewhere at the end of the step: what the body has then at `x`, and there
@@ -69,6 +75,12 @@ impl BodyProblem {
         let gained = there.elastic - self.current.elastic - lost;
         self.trial = there;
         gained
+    }
+
+    /// Whether no node begins by going farther than half an edge of the surface in the step.
+    pub fn starts_slowly(&self) -> bool {
+        let far = 0.5 * self.model.surface.mean_edge / self.h;
+        self.v_start.iter().all(|v| v.norm_squared() <= far * far)
     }
 
     /// Rejects the step: puts a free body where it goes in its shape without contacts, a pinned one back to its start. About

@@ -204,6 +204,14 @@ impl ContactSystem {
         [made - recovered.min(most), exchanged]
     }
 
+    /// Whether there are forces between two bodies.
+    pub fn act_between(&self, a: usize, b: usize) -> bool {
+        self.active.iter().any(|contact| {
+            let is_at = |body: usize| contact.constraint.all_endpoints().any(|e| e.is_of(body));
+            is_at(a) && is_at(b) && contact.force(&self.lambda) != Vec3::zeros()
+        })
+    }
+
     /// Whether something holds a body fast.
     pub fn has_hard_holds(&self, index: usize) -> bool {
         let is_own = |constraint: &Constraint| constraint.all_endpoints().any(|e| e.is_of(index));

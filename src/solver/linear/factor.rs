@@ -4,6 +4,7 @@
 //! worth, and parallelism is over bodies. Everything works in memory the caller owns.
 
 use super::factor_values::{Factor, NotPositiveDefinite};
+use super::lower_triangle::LowerTriangle;
 use super::operator::ConjugateScratch;
 use super::supernodes::{Entry, Supernodes};
 use crate::math::lanes::Lane;
@@ -14,6 +15,9 @@ use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::perm::PermRef;
 use faer::reborrow::ReborrowMut;
+use faer::sparse::linalg::cholesky::supernodal::{
+    SymbolicSupernodalCholesky, factorize_supernodal_numeric_llt, factorize_supernodal_numeric_llt_scratch,
+};
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
@@ -32,11 +36,23 @@ pub(crate) struct Symbolic {
     /// Unknowns per node.
     pub(super) d: usize,
     /// None of a matrix that is not put together.
-    analysis: Option<(SymbolicSparseColMat<usize>, SymbolicCholesky<usize>)>,
+    analysis: Option<Analysis>,
     pub(super) supernodes: Supernodes,
     /// Old node at each new place, and the other way round.
     order: Vec<usize>,
     pub(super) places: Vec<usize>,
+}
+
+/// What a factorization needs to know.
+#[derive(Debug)]
+struct Analysis {
+    /// The upper triangle.
+    pattern: SymbolicSparseColMat<usize>,
+    cholesky: SymbolicCholesky<usize>,
+    /// The lower triangle in the order of elimination, and where its numbers are in the upper one. faer looks both up in every
+    /// factorization: a twentieth of the step of a flag of 365 vertices.
+    ordered: SymbolicSparseColMat<usize>,
+    sources: Vec<u32>,
 }
 
 /// Memory for solves and factorizations; grows to what is needed and stays.
@@ -47,7 +63,8 @@ pub(crate) struct FactorScratch {
     pub(super) ordered: Vec<f64>,
     gathered: Vec<f64>,
     panel: Vec<f64>,
-    /// A factor as faer makes it.
+    /// A matrix in the order of elimination, and a factor as faer makes it.
+    values: Vec<f64>,
     made: Vec<f64>,
     /// Right-hand sides, and the nodes that they are of.
     pub(super) batch: Vec<f64>,
@@ -87,7 +104,12 @@ impl Symbolic {
         );
         let cholesky = cholesky.ok()?;
         let supernodes = supernodes_of(&cholesky, d)?;
-        Some(Self { d, analysis: Some((pattern, cholesky)), supernodes, order, places })
+        let LowerTriangle { starts, rows, sources } =
+            LowerTriangle::new(pattern.col_ptr(), pattern.row_idx(), &all_places)?;
+        // What is summed up nowhere may stand in any order within its column.
+        let ordered = SymbolicSparseColMat::new_unsorted_checked(d * n, d * n, starts, None, rows);
+        let analysis = Some(Analysis { pattern, cholesky, ordered, sources });
+        Some(Self { d, analysis, supernodes, order, places })
     }
 
     /// Of `n` nodes in their own order, without a matrix.
@@ -97,11 +119,11 @@ impl Symbolic {
     }
 
     pub fn column_starts(&self) -> &[usize] {
-        self.analysis.as_ref().map_or(&[], |(pattern, _)| pattern.col_ptr())
+        self.analysis.as_ref().map_or(&[], |analysis| analysis.pattern.col_ptr())
     }
 
     pub fn rows(&self) -> &[usize] {
-        self.analysis.as_ref().map_or(&[], |(pattern, _)| pattern.row_idx())
+        self.analysis.as_ref().map_or(&[], |analysis| analysis.pattern.row_idx())
     }
 
     /// Numbers in a numeric factor.
@@ -127,27 +149,29 @@ impl Symbolic {
         values: &[f64],
         scratch: &mut FactorScratch,
     ) -> Result<(), NotPositiveDefinite> {
-        let Some((pattern, cholesky)) = &self.analysis else { return Err(NotPositiveDefinite) };
-        let A = SparseColMatRef::new(pattern.as_ref(), values);
-        let need = cholesky.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
-        let mut made = std::mem::take(&mut scratch.made);
+        let analysis = self.analysis.as_ref().ok_or(NotPositiveDefinite)?;
+        let raw = supernodal(&analysis.cholesky).ok_or(NotPositiveDefinite)?;
+        let need = factorize_supernodal_numeric_llt_scratch::<usize, f64>(raw, Par::Seq, Spec::default());
+        let (mut ordered, mut made) =
+            (std::mem::take(&mut scratch.values), std::mem::take(&mut scratch.made));
+        ordered.clear();
+        ordered.extend(analysis.sources.iter().map(|&source| values[source as usize]));
         made.clear();
-        made.resize(cholesky.len_val(), 0.0);
-        let result = cholesky
-            .factorize_numeric_llt(
-                &mut made,
-                A,
-                Side::Upper,
-                Default::default(),
-                Par::Seq,
-                scratch.stack(need.unaligned_bytes_required()),
-                Spec::default(),
-            )
-            .map(|_| ());
+        made.resize(raw.len_val(), 0.0);
+        let result = factorize_supernodal_numeric_llt(
+            &mut made,
+            SparseColMatRef::new(analysis.ordered.as_ref(), &ordered),
+            Default::default(),
+            raw,
+            Par::Seq,
+            scratch.stack(need.unaligned_bytes_required()),
+            Spec::default(),
+        )
+        .map(|_| ());
         if result.is_ok() {
             self.pack(&mut made, &mut scratch.panel, factor);
         }
-        scratch.made = made;
+        (scratch.values, scratch.made) = (ordered, made);
         result.map_err(|_| NotPositiveDefinite)
     }
 
@@ -285,10 +309,17 @@ fn ordering(pattern: SymbolicSparseColMat<usize>) -> Option<(Vec<usize>, Vec<usi
     Some((order, places))
 }
 
+fn supernodal(cholesky: &SymbolicCholesky<usize>) -> Option<&SymbolicSupernodalCholesky<usize>> {
+    match cholesky.raw() {
+        SymbolicCholeskyRaw::Supernodal(raw) => Some(raw),
+        SymbolicCholeskyRaw::Simplicial(_) => None,
+    }
+}
+
 /// Where faer keeps the columns of a factor, in nodes of `d` unknowns. The unknowns of a node have the same pattern
 /// and are eliminated together, so supernodes are of whole nodes; `None` if they were not.
 fn supernodes_of(cholesky: &SymbolicCholesky<usize>, d: usize) -> Option<Supernodes> {
-    let SymbolicCholeskyRaw::Supernodal(raw) = cholesky.raw() else { return None };
+    let raw = supernodal(cholesky)?;
     let mut supernodes = Supernodes::new(d);
     let begin = &raw.supernode_begin()[..raw.n_supernodes()];
     for (s, end) in begin.iter().copied().chain([cholesky.nrows()]).skip(1).enumerate() {

@@ -10,6 +10,7 @@ mod changed_pins;
 #[cfg(test)]
 mod factor_tests;
 mod factor_values;
+mod lower_triangle;
 
 mod factor;
 mod solves;
@@ -45,7 +46,8 @@ pub(crate) use factor_cache::{FactorCache, FactorId, SystemFactor, columns_pay};
 pub use modes::DeformableMode;
 pub(crate) use preconditioner::{BlockForm, Preconditioner};
 pub(crate) use system::{
-    FactorKey, MatrixValues, TangentPlace, assemble_tangent, assemble_tangent_beside, pattern_of,
+    FactorKey, MatrixValues, TangentPlace, assemble_constant, assemble_tangent, assemble_tangent_beside,
+    pattern_of,
 };
 pub(crate) use unused_factors::STEPS_KEPT;
 #[cfg(test)]

@@ -166,6 +166,19 @@ pub(crate) fn assemble(
     made.values
 }
 
+/// As [`assemble`] with [`SystemMatrix::RestStiffness`], in memory that serves again.
+pub(crate) fn assemble_constant(
+    elements: &Elements<'_>,
+    (pins, h): (&[u32], f64),
+    symbolic: &Symbolic,
+    into: &mut MatrixValues,
+) {
+    let (model, materials, system) = (elements.model, elements.materials, SystemMatrix::RestStiffness);
+    let mut matrix = Upper::new(model, materials, pins, system, h, (symbolic, into));
+    let stiffening = |material: &DeformableMaterial| material.stiffening(h);
+    add_blocks(elements, system, stiffening, |i, j, block| matrix.add_elastic(i, j, block));
+}
+
 /// The values of a matrix, in the order of [`Symbolic::rows`], in memory that serves again.
 #[derive(Default)]
 pub(crate) struct MatrixValues {
