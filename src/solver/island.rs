@@ -166,6 +166,9 @@ impl Island {
         // Between several bodies such steps end in worse: one of a rope and a film of 1e6 Pa made a tenth of the energy of their impact. What
         // is faster stops at what it meets as a rigid body: the corner of a cloth of 100 m/s came 4 cm past a ridge of a heightfield, not 2.
         let [body] = &self.bodies[..] else { return };
+        if body.model.is_solid() {
+            return;
+        }
         if body.settings.solver == Solver::Newton
             && body.starts_slowly()
             && self.would_be_rejected(0, context)
