@@ -302,7 +302,7 @@ impl SolverSettings {
     /// With what a step of a body is solved that is in this state.
     pub(crate) fn of_step(self, state: StepState) -> Self {
         let newton = |count: usize| {
-            let iterations = (count * self.max_iterations).div_ceil(ITERATIONS_OF_NEWTON);
+            let iterations = count.saturating_mul(self.max_iterations).div_ceil(ITERATIONS_OF_NEWTON);
             self.solver(Solver::Newton).max_iterations(iterations)
         };
         match (self.solver, state) {

@@ -9,7 +9,7 @@ use crate::material::DeformableMaterial;
 use crate::math::Mat3;
 
 /// Of the triangles that are flat at rest and of one region with their neighbours.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct FlatBends {
     regions: Vec<RegionBends>,
 }

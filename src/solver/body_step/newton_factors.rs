@@ -8,7 +8,7 @@ use crate::fem::SystemMatrix;
 use crate::mesh::Surface;
 use crate::solver::linear::{
     CoarseInverse, ComplianceColumns, Factor, FactorCache, FactorScratch, MatrixValues, Symbolic,
-    SystemFactor, TangentPlace, assemble_constant, assemble_tangent, columns_pay,
+    SystemFactor, TangentPlace, assemble_into, assemble_tangent, columns_pay,
 };
 use std::sync::Arc;
 
@@ -166,7 +166,7 @@ impl NewtonFactors {
         Some(OwnFactor { factor, has_columns, is_constant: body.has_constant_matrix })
     }
 
-    /// Sets the numbers of the factor of a body's Hessian; false if it is not positive definite.
+    /// Sets the numbers of the factor of a body's Hessian, or of what it has in its place; false if it is not positive definite.
     fn factorize(
         &mut self,
         body: &BodyProblem,
@@ -175,7 +175,8 @@ impl NewtonFactors {
         numbers: &mut Vec<f64>,
     ) -> bool {
         if body.has_constant_matrix {
-            assemble_constant(&body.elements(), (&body.key.pins, body.h()), symbolic, &mut self.matrix);
+            let of = (&body.key.pins[..], SystemMatrix::RestStiffness, body.h());
+            assemble_into(&body.elements(), of, symbolic, &mut self.matrix);
             return symbolic.factorize_into(numbers, &self.matrix.values, &mut self.scratch).is_ok();
         }
         let place = TangentPlace { x: &body.current.x, projected, pins: &body.key.pins, h: body.h() };

@@ -46,7 +46,7 @@ pub(crate) use factor_cache::{FactorCache, FactorId, SystemFactor, columns_pay};
 pub use modes::DeformableMode;
 pub(crate) use preconditioner::{BlockForm, Preconditioner};
 pub(crate) use system::{
-    FactorKey, MatrixValues, TangentPlace, assemble_constant, assemble_tangent, assemble_tangent_beside,
+    FactorKey, MatrixValues, TangentPlace, assemble_into, assemble_tangent, assemble_tangent_beside,
     pattern_of,
 };
 pub(crate) use unused_factors::STEPS_KEPT;

@@ -159,22 +159,19 @@ pub(crate) fn assemble(
     symbolic: &Symbolic,
 ) -> Vec<f64> {
     let mut made = MatrixValues::default();
-    let mut matrix = Upper::new(model, materials, pins, system, h, (symbolic, &mut made));
     let elements = Elements { model, materials, activations: &[] };
-    let stiffening = |material: &DeformableMaterial| material.stiffening(h);
-    add_blocks(&elements, system, stiffening, |i, j, block| matrix.add_elastic(i, j, block));
+    assemble_into(&elements, (pins, system, h), symbolic, &mut made);
     made.values
 }
 
-/// As [`assemble`] with [`SystemMatrix::RestStiffness`], in memory that serves again.
-pub(crate) fn assemble_constant(
+/// As [`assemble`], in memory that serves again.
+pub(crate) fn assemble_into(
     elements: &Elements<'_>,
-    (pins, h): (&[u32], f64),
+    (pins, system, h): (&[u32], SystemMatrix, f64),
     symbolic: &Symbolic,
     into: &mut MatrixValues,
 ) {
-    let (model, materials, system) = (elements.model, elements.materials, SystemMatrix::RestStiffness);
-    let mut matrix = Upper::new(model, materials, pins, system, h, (symbolic, into));
+    let mut matrix = Upper::new(elements.model, elements.materials, pins, system, h, (symbolic, into));
     let stiffening = |material: &DeformableMaterial| material.stiffening(h);
     add_blocks(elements, system, stiffening, |i, j, block| matrix.add_elastic(i, j, block));
 }
