@@ -161,16 +161,20 @@ mod tests {
             let on_face = surface_point(&obstacle, &(inner + Vec3::y() * 1e-3), &-Vec3::y(), &SCALES).unwrap();
             prop_assume!(on_face.flat);
             let found = leaves_face(shape.as_trimesh().unwrap(), &on_face, [&inner, &outer], &SCALES, &mut Vec::new());
-            let is_over = |t: f64| is_over_face(&obstacle, &on_face, &(inner + (outer - inner) * t), &SCALES);
+            let at = |t: f64| inner + (outer - inner) * t;
+            let is_over = |p: Vec3| is_over_face(&obstacle, &on_face, &p, &SCALES);
+            // parry's `f32` projections of places within a few micrometres of a seam fall on the seam, and look beside the face.
+            let beside = |p: Vec3| [Vec3::x(), -Vec3::x(), Vec3::z(), -Vec3::z()].map(|axis| p + axis * 2e-5);
+            let is_nearly_over = |p: Vec3| is_over(p) || beside(p).into_iter().any(is_over);
             match found {
-                FaceEnd::Other => prop_assert!(to[0].abs().max(to[1].abs()) < 0.5 + 2e-6 && is_over(1.0)),
+                FaceEnd::Other => prop_assert!(to[0].abs().max(to[1].abs()) < 0.5 + 2e-6 && is_nearly_over(at(1.0))),
                 FaceEnd::Ridge(t) => {
                     // parry's `f32` projections miss by a few micrometres, across the rim.
                     let across = (0..2).map(|k| (to[k] - from[k]).abs()).fold(f64::INFINITY, f64::min);
                     prop_assume!(across > 1e-2);
                     let near = 2e-5 / across;
-                    prop_assert!(is_over((t - near).max(0.0)), "{t}");
-                    prop_assert!(!is_over(t + near), "{t}");
+                    prop_assert!(is_nearly_over(at((t - near).max(0.0))), "{t}");
+                    prop_assert!(!is_over(at(t + near)), "{t}");
                 }
             }
         }

@@ -92,13 +92,13 @@ impl BodyProblem {
     /// Begins again where the body is held, or may be touched: by generalized-α, if it is of the second order, and where it is touched
     /// with what then solves it.
     pub fn begin_held(&mut self, body: &DeformableBody, is_touched: bool, gravity: &Vec3) {
-        let before = (self.scheme, self.settings.solver);
+        let before = (self.scheme, self.settings);
         if self.settings.integrator == Integrator::Bdf2 {
             let goes = self.goes_by_alpha(body, gravity);
             self.scheme = if goes { Scheme::GeneralizedAlpha } else { Scheme::ImplicitEuler };
         }
         self.is_touched = is_touched;
-        if before != (self.scheme, self.settings_of(body).solver) {
+        if before != (self.scheme, self.settings_of(body)) {
             self.read_body(body, gravity);
         }
     }

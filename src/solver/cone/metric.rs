@@ -98,6 +98,17 @@ impl ConeMetric {
         range.start + rows.partition_point(|(i, _)| *i < row)
     }
 
+    /// `out = V Vᵀ v`; `p` is memory.
+    pub fn multiply_modes(&self, v: &[f64], p: &mut Vec<Modes>, out: &mut Vec<f64>) {
+        p.clear();
+        p.resize(self.bodies, STILL);
+        self.contacts.iter().for_each(|contact| contact.add_modes(contact.of(v), p));
+        out.clear();
+        for contact in &self.contacts {
+            out.extend_from_slice(&contact.along(p)[..contact.dimension]);
+        }
+    }
+
     /// How far forces z with gradient `r = W z + b` are from solving the problem: `‖Π(z − r/D) − z‖∞` over the
     /// largest force.
     pub fn error(&self, z: &[f64], r: &[f64], tolerance: ConeTolerance) -> f64 {

@@ -5,7 +5,7 @@
 //! be stopped anywhere.
 
 use super::coarse_newton::{CoarseNewton, CoarseProblem};
-use super::metric::ConeMetric;
+use super::metric::{ConeMetric, Modes};
 use super::problem::{ConeTolerance, product};
 
 /// Memory for solves.
@@ -15,6 +15,7 @@ pub(crate) struct ProjectedGradient {
     d: Vec<f64>,
     Wd: Vec<f64>,
     VVd: Vec<f64>,
+    modes: Vec<Modes>,
     /// Factor on 1/D, kept between the solves of a step.
     alpha: f64,
 }
@@ -39,6 +40,10 @@ pub(crate) struct GradientBudget {
 pub(crate) trait ConeOperator {
     /// `out = W v`.
     fn multiply(&mut self, v: &[f64], out: &mut Vec<f64>);
+    /// Lets the forces of what is solved for beside the method follow a change d, at the gradient r; whether there are such.
+    fn follow(&self, _r: &[f64], _d: &mut [f64]) -> bool {
+        false
+    }
     /// The forces have gone `t` times the last v.
     fn advance(&mut self, t: f64);
 }
@@ -67,7 +72,7 @@ impl ProjectedGradient {
         while work.error > tolerance.relative && work.products < products {
             let problem = CoarseProblem { metric, z, r, alpha: self.alpha, goes_on };
             self.coarse.solve(&problem, [&mut self.d, &mut self.VVd]);
-            let slope = product(r, &self.d);
+            let slope = self.complete_direction(metric, r, operator);
             if !(slope < 0.0) {
                 break;
             }
@@ -84,6 +89,21 @@ impl ProjectedGradient {
             work.error = metric.error(z, r, tolerance);
         }
         work
+    }
+
+    /// Lets what is solved for beside the method follow the direction, and returns the slope along that.
+    fn complete_direction(&mut self, metric: &ConeMetric, r: &[f64], operator: &impl ConeOperator) -> f64 {
+        let slope = |d: &[f64]| product(r, d);
+        if !operator.follow(r, &mut self.d) {
+            return slope(&self.d);
+        }
+        if !(slope(&self.d) < 0.0) {
+            // Where that is far from solved it comes first, alone: the objective falls along what solves it.
+            self.d.fill(0.0);
+            operator.follow(r, &mut self.d);
+        }
+        metric.multiply_modes(&self.d, &mut self.modes, &mut self.VVd);
+        slope(&self.d)
     }
 
     /// The two lengths of Barzilai and Borwein in turn [Dai & Fletcher 2005], of what of W is not in V Vᵀ.

@@ -2,6 +2,7 @@
 //! rigid bodies, every touched body solves once with its own factor, and its motion is read off at the contacts.
 
 use super::context::SolveContext;
+use super::held_rows::HeldRows;
 use super::lists::ActiveContact;
 use super::rigid_proxy::Reaction;
 use crate::contact::{Constraint, Endpoint};
@@ -33,6 +34,7 @@ pub(super) struct MatrixFree<'a> {
     pub factors: Factors<'a>,
     pub context: &'a SolveContext<'a>,
     pub response: &'a mut Response,
+    pub held: &'a HeldRows,
 }
 
 impl MatrixFree<'_> {
@@ -95,6 +97,10 @@ impl ConeOperator for MatrixFree<'_> {
             out.extend(constraint.directions().iter().map(|d| d.dot(&moved)));
             out[normal] += constraint.compliance * v[normal];
         }
+    }
+
+    fn follow(&self, r: &[f64], d: &mut [f64]) -> bool {
+        self.held.follow(r, d)
     }
 
     fn advance(&mut self, t: f64) {

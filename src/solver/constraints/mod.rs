@@ -7,6 +7,7 @@ mod context;
 mod elimination;
 
 mod groups;
+mod held_rows;
 
 mod jacobian;
 

@@ -1,6 +1,7 @@
 //! Constraints along paths in the Delassus operator. Each has its column of W from one product: one solve of every body that
 //! it runs through, wherever in it, so that it asks for no compliance columns.
 
+use super::held_rows::HeldRows;
 use super::improve::Around;
 use super::lists::{ActiveContact, MatrixPlace};
 use super::matrix_free::MatrixFree;
@@ -101,8 +102,15 @@ impl ContactSystem {
         let (active, response) = (&self.active[..], &mut self.free.response);
         for (place, path) in active.iter().enumerate().filter(|(_, c)| !c.constraint.path.is_empty()) {
             unit[path.first] = 1.0;
-            MatrixFree { contacts: active, bodies: &mut *bodies, factors, context, response: &mut *response }
-                .multiply(&unit, &mut column);
+            MatrixFree {
+                contacts: active,
+                bodies: &mut *bodies,
+                factors,
+                context,
+                response: &mut *response,
+                held: &HeldRows::default(),
+            }
+            .multiply(&unit, &mut column);
             unit[path.first] = 0.0;
             f(active, place, &column);
         }

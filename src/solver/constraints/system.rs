@@ -9,6 +9,7 @@ use super::context::SolveContext;
 use super::delassus::Delassus;
 use super::gaps::{motion, relative_motion};
 use super::groups::ContactGroups;
+use super::held_rows::HeldRows;
 use super::lists::{ActiveContact, Candidate, ContactResult};
 use super::matrix_free::Response;
 use super::overlaps::{is_overlap, is_soft_pair};
@@ -77,6 +78,7 @@ pub(super) struct FreeSolve {
     pub coarse: CoarseSpace,
     pub metric: ConeMetric,
     pub method: ProjectedGradient,
+    pub held: HeldRows,
     pub r: Vec<f64>,
     pub change: Change,
 }
