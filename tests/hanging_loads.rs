@@ -105,5 +105,5 @@ fn nearly_all_cloths_swing_with_their_boxes() {
     let stuck = shown.iter().filter(|shown| shown.rejected > 0.5).count();
     let rejected = shown.iter().map(|shown| shown.rejected).sum::<f64>() / all.len() as f64;
     println!("{stuck} of {} are mostly rejected, {:.1} % of the steps", all.len(), rejected * 1e2);
-    assert!(stuck <= 4 && rejected < 0.2, "{stuck} {rejected}");
+    assert!(stuck <= 3 && rejected < 0.2, "{stuck} {rejected}");
 }

@@ -5,8 +5,9 @@
 //! be stopped anywhere.
 
 use super::coarse_newton::{CoarseNewton, CoarseProblem};
-use super::metric::{ConeMetric, Modes};
+use super::metric::{ConeMetric, MetricContact, Modes};
 use super::problem::{ConeTolerance, product};
+use crate::contact::Law;
 
 /// Memory for solves.
 #[derive(Default)]
@@ -48,6 +49,16 @@ pub(crate) trait ConeOperator {
     fn advance(&mut self, t: f64);
 }
 
+/// What chooses a direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Leads {
+    All,
+    /// What is solved for beside the method follows.
+    Contacts,
+    /// That alone.
+    HeldAlone,
+}
+
 /// α of a step's first solve: what is elastic and not affine adds up to about twice D.
 const FIRST_ALPHA: f64 = 0.5;
 /// Bounds of α.
@@ -69,10 +80,12 @@ impl ProjectedGradient {
         operator: &mut impl ConeOperator,
     ) -> GradientWork {
         let mut work = GradientWork { products: 0, error: metric.error(z, r, tolerance) };
+        let mut brings_back = true;
         while work.error > tolerance.relative && work.products < products {
             let problem = CoarseProblem { metric, z, r, alpha: self.alpha, goes_on };
             self.coarse.solve(&problem, [&mut self.d, &mut self.VVd]);
-            let slope = self.complete_direction(metric, r, operator);
+            let (leads, slope) = self.complete_direction(metric, r, operator, brings_back);
+            brings_back &= leads != Leads::HeldAlone;
             if !(slope < 0.0) {
                 break;
             }
@@ -85,31 +98,41 @@ impl ProjectedGradient {
                 r[k] += t * self.Wd[k];
             }
             operator.advance(t);
-            self.choose_alpha(metric, work.products);
+            if leads != Leads::HeldAlone {
+                self.choose_alpha(metric, work.products, leads);
+            }
             work.error = metric.error(z, r, tolerance);
         }
         work
     }
 
-    /// Lets what is solved for beside the method follow the direction, and returns the slope along that.
-    fn complete_direction(&mut self, metric: &ConeMetric, r: &[f64], operator: &impl ConeOperator) -> f64 {
-        let slope = |d: &[f64]| product(r, d);
+    /// Lets what is solved for beside the method follow the direction; what leads along it then, and its slope. What holds may come alone, where
+    /// it `brings_back` what it is off by.
+    fn complete_direction(
+        &mut self,
+        metric: &ConeMetric,
+        r: &[f64],
+        operator: &impl ConeOperator,
+        brings_back: bool,
+    ) -> (Leads, f64) {
         if !operator.follow(r, &mut self.d) {
-            return slope(&self.d);
+            return (Leads::All, product(r, &self.d));
         }
-        if !(slope(&self.d) < 0.0) {
-            // Where that is far from solved it comes first, alone: the objective falls along what solves it.
+        let mut leads = Leads::Contacts;
+        if brings_back && !(product(r, &self.d) < 0.0) {
             self.d.fill(0.0);
             operator.follow(r, &mut self.d);
+            leads = Leads::HeldAlone;
         }
         metric.multiply_modes(&self.d, &mut self.modes, &mut self.VVd);
-        slope(&self.d)
+        (leads, product(r, &self.d))
     }
 
     /// The two lengths of Barzilai and Borwein in turn [Dai & Fletcher 2005], of what of W is not in V Vᵀ.
-    fn choose_alpha(&mut self, metric: &ConeMetric, products: usize) {
+    fn choose_alpha(&mut self, metric: &ConeMetric, products: usize, leads: Leads) {
         let (mut dDd, mut dRd, mut RDR) = (0.0, 0.0, 0.0);
-        for contact in &metric.contacts {
+        let counts = |contact: &&MetricContact| leads == Leads::All || contact.law != Law::BILATERAL;
+        for contact in metric.contacts.iter().filter(counts) {
             for k in contact.first..contact.first + contact.dimension {
                 let rest = self.Wd[k] - self.VVd[k];
                 dDd += self.d[k] * self.d[k] * contact.D;

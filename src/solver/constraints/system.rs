@@ -55,6 +55,8 @@ pub(super) struct Spent {
     pub operations: usize,
     /// Newton's method from the forces as they were.
     pub failures: usize,
+    /// Products for columns of what holds.
+    pub for_held: usize,
 }
 
 /// Newton's method and sweeps, with the Delassus operator as a matrix.

@@ -17,6 +17,9 @@ const SHIFT_BLEND: f64 = 0.5;
 pub(super) const PRODUCTS: [usize; 2] = [2, 10];
 /// Iterations of the step's budget that a product, with the coarse problem before it, counts for.
 const PRODUCT_COST: usize = 2;
+/// Products that make columns of what holds, at the most, for each of the step's iterations: a cloth that carries a box at three vertices takes
+/// nine in each of thirty iterations.
+const HELD_PRODUCTS: usize = 4;
 /// Part of its first error that a solve leaves to the next outer iteration.
 const REDUCTION: f64 = 0.1;
 
@@ -62,22 +65,31 @@ impl ContactSystem {
 
     fn update_metric(&mut self, bodies: &mut [BodyProblem], around: Around<'_>) {
         let Around { factors, context, .. } = around;
+        let change = std::mem::take(&mut self.free.change);
+        if change >= Change::Frames {
+            self.free.held.clear();
+        }
         // Any metric serves; frames that turn within a step do not matter to it.
-        if self.free.change >= Change::Factors {
+        if change >= Change::Factors {
             let parts = CoarseParts { bodies, factors, proxies: context.proxies, h: context.h };
             self.free.coarse.update(&mut self.free.metric, &self.active, parts);
-            self.free.change = Change::Nothing;
-            self.free.held.clear();
             self.measure_paths(bodies, around);
         }
     }
 
-    /// Has what holds solved for in every product from now on.
+    /// Has what holds solved for in every product from now on, while that leaves the step's time bounded; not of what moves as a rigid body, whose
+    /// attached vertices hold one another.
     fn solve_for_held(&mut self, bodies: &mut [BodyProblem], Around { factors, context, .. }: Around<'_>) {
+        let most = HELD_PRODUCTS * context.limits.iterations;
+        if self.spent.for_held > most || bodies.iter().any(|body| body.preconditioner.is_rigid()) {
+            return;
+        }
         let (contacts, FreeSolve { held, response, .. }) = (&self.active, &mut self.free);
         let nothing = &HeldRows::default();
         let mut operator = MatrixFree { contacts, bodies, factors, context, response, held: nothing };
-        self.work.products += held.make(contacts, self.lambda.len(), &mut operator);
+        let products = held.make(contacts, self.lambda.len(), &mut operator);
+        self.work.products += products;
+        self.spent.for_held += products;
     }
 
     /// The gradient of the present forces, and their error.
