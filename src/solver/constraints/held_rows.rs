@@ -1,10 +1,11 @@
 //! What holds deformable bodies fast, solved for in every product of the projected gradients.
 //!
 //! Forces change by `d`, of contacts `d_c`; those of what holds follow, `d_b = −W_bb⁻¹ (r_b + W_bc d_c)`, so that it goes on holding: static
-//! condensation [Guyan 1965] without W. Left among the contacts, three vertices that carried 3.6 kg by a cloth of 50 g ended sixty products with
+//! condensation [Guyan 1965] without W. Left among the contacts, three vertices that carried 3.6 kg by a cloth of 200 g ended sixty products with
 //! errors of a hundred times their forces.
 
 use super::lists::ActiveContact;
+use super::matrix_free::for_each_column;
 use crate::solver::cone::ConeOperator;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -47,13 +48,8 @@ impl HeldRows {
             return 0;
         }
         self.columns.clear();
-        let (mut unit, mut column) = (vec![0.0; rows], Vec::new());
-        for &row in &self.rows {
-            unit[row] = 1.0;
-            operator.multiply(&unit, &mut column);
-            unit[row] = 0.0;
-            self.columns.extend_from_slice(&column);
-        }
+        let listed = self.rows.iter().map(|&row| ((), row));
+        for_each_column(operator, rows, listed, |(), column| self.columns.extend_from_slice(column));
         let held = self.rows.len();
         let among = DMatrix::from_fn(held, held, |i, j| {
             let entry = self.columns[j * rows + self.rows[i]];
@@ -64,7 +60,7 @@ impl HeldRows {
     }
 
     /// Lets the forces of what holds follow a change d of the others, with r the gaps before it; whether something holds.
-    pub fn follow(&self, r: &[f64], d: &mut [f64]) -> bool {
+    fn follow(&self, r: &[f64], d: &mut [f64]) -> bool {
         let Some(factor) = &self.factor else { return false };
         self.rows.iter().for_each(|&row| d[row] = 0.0);
         let column = |k: usize| &self.columns[k * d.len()..(k + 1) * d.len()];
@@ -75,6 +71,26 @@ impl HeldRows {
             self.rows.iter().zip(forces.iter()).for_each(|(&row, force)| d[row] = -force);
         }
         true
+    }
+}
+
+/// Products in which what holds is solved for.
+pub(super) struct Holding<'a, O> {
+    pub operator: O,
+    pub held: &'a HeldRows,
+}
+
+impl<O: ConeOperator> ConeOperator for Holding<'_, O> {
+    fn multiply(&mut self, v: &[f64], out: &mut Vec<f64>) {
+        self.operator.multiply(v, out);
+    }
+
+    fn follow(&self, r: &[f64], d: &mut [f64]) -> bool {
+        self.held.follow(r, d)
+    }
+
+    fn advance(&mut self, t: f64) {
+        self.operator.advance(t);
     }
 }
 
@@ -89,20 +105,13 @@ mod tests {
 
     const PUSHES: Law = Law::Bounded { least: 0.0, most: f64::INFINITY };
 
-    /// W as a matrix, with or without what holds solved for.
-    struct Dense<'a> {
-        W: &'a DMatrix<f64>,
-        held: &'a HeldRows,
-    }
+    /// W as a matrix.
+    struct Dense<'a>(&'a DMatrix<f64>);
 
     impl ConeOperator for Dense<'_> {
         fn multiply(&mut self, v: &[f64], out: &mut Vec<f64>) {
             out.clear();
-            out.extend((self.W * DVector::from_column_slice(v)).iter());
-        }
-
-        fn follow(&self, r: &[f64], d: &mut [f64]) -> bool {
-            self.held.follow(r, d)
+            out.extend((self.0 * DVector::from_column_slice(v)).iter());
         }
 
         fn advance(&mut self, _: f64) {}
@@ -126,7 +135,7 @@ mod tests {
 
     fn made(W: &DMatrix<f64>) -> HeldRows {
         let (mut held, rows) = (HeldRows::default(), W.nrows());
-        let mut operator = Dense { W, held: &HeldRows::default() };
+        let mut operator = Dense(W);
         assert_eq!(held.make(&contacts(rows), rows, &mut operator), rows.div_ceil(3));
         assert_eq!(held.make(&contacts(rows), rows, &mut operator), 0, "made twice");
         held
@@ -149,7 +158,8 @@ mod tests {
         method.begin();
         let tolerance = ConeTolerance { relative: 1e-9, floor: 1e-9 };
         let budget = GradientBudget { products: 20_000, goes_on: false };
-        method.solve(&metric, [&mut z, &mut r], tolerance, budget, &mut Dense { W, held });
+        let mut operator = Holding { operator: Dense(W), held };
+        method.solve(&metric, [&mut z, &mut r], tolerance, budget, &mut operator);
         (z, r)
     }
 

@@ -2,7 +2,6 @@
 //! rigid bodies, every touched body solves once with its own factor, and its motion is read off at the contacts.
 
 use super::context::SolveContext;
-use super::held_rows::HeldRows;
 use super::lists::ActiveContact;
 use super::rigid_proxy::Reaction;
 use crate::contact::{Constraint, Endpoint};
@@ -34,7 +33,6 @@ pub(super) struct MatrixFree<'a> {
     pub factors: Factors<'a>,
     pub context: &'a SolveContext<'a>,
     pub response: &'a mut Response,
-    pub held: &'a HeldRows,
 }
 
 impl MatrixFree<'_> {
@@ -78,6 +76,22 @@ impl MatrixFree<'_> {
     }
 }
 
+/// Calls `f` with columns of W, of `rows` rows, by a product each, and what they are listed with.
+pub(super) fn for_each_column<T>(
+    operator: &mut impl ConeOperator,
+    rows: usize,
+    columns: impl Iterator<Item = (T, usize)>,
+    mut f: impl FnMut(T, &[f64]),
+) {
+    let (mut unit, mut column) = (vec![0.0; rows], Vec::new());
+    for (listed, row) in columns {
+        unit[row] = 1.0;
+        operator.multiply(&unit, &mut column);
+        unit[row] = 0.0;
+        f(listed, &column);
+    }
+}
+
 impl ConeOperator for MatrixFree<'_> {
     fn multiply(&mut self, v: &[f64], out: &mut Vec<f64>) {
         self.begin();
@@ -97,10 +111,6 @@ impl ConeOperator for MatrixFree<'_> {
             out.extend(constraint.directions().iter().map(|d| d.dot(&moved)));
             out[normal] += constraint.compliance * v[normal];
         }
-    }
-
-    fn follow(&self, r: &[f64], d: &mut [f64]) -> bool {
-        self.held.follow(r, d)
     }
 
     fn advance(&mut self, t: f64) {

@@ -1,15 +1,13 @@
 //! Constraints along paths in the Delassus operator. Each has its column of W from one product: one solve of every body that
 //! it runs through, wherever in it, so that it asks for no compliance columns.
 
-use super::held_rows::HeldRows;
 use super::improve::Around;
 use super::lists::{ActiveContact, MatrixPlace};
-use super::matrix_free::MatrixFree;
+use super::matrix_free::{MatrixFree, for_each_column};
 use super::system::ContactSystem;
 use crate::body::{CablePart, CableRow, ConstraintKey};
 use crate::contact::Law;
 use crate::solver::body_step::BodyProblem;
-use crate::solver::cone::ConeOperator;
 use crate::solver::linear::BlockMatrix;
 
 /// Solves in an iteration until bounds have followed the tensions, at the most; what is left is for the next iteration, or step. At
@@ -98,22 +96,11 @@ impl ContactSystem {
         if self.active.iter().all(|contact| contact.constraint.path.is_empty()) {
             return;
         }
-        let (mut unit, mut column) = (vec![0.0; self.lambda.len()], Vec::new());
         let (active, response) = (&self.active[..], &mut self.free.response);
-        for (place, path) in active.iter().enumerate().filter(|(_, c)| !c.constraint.path.is_empty()) {
-            unit[path.first] = 1.0;
-            MatrixFree {
-                contacts: active,
-                bodies: &mut *bodies,
-                factors,
-                context,
-                response: &mut *response,
-                held: &HeldRows::default(),
-            }
-            .multiply(&unit, &mut column);
-            unit[path.first] = 0.0;
-            f(active, place, &column);
-        }
+        let paths = active.iter().enumerate().filter(|(_, c)| !c.constraint.path.is_empty());
+        let columns = paths.map(|(place, path)| (place, path.first));
+        let mut operator = MatrixFree { contacts: active, bodies, factors, context, response };
+        for_each_column(&mut operator, self.lambda.len(), columns, |place, column| f(active, place, column));
     }
 }
 

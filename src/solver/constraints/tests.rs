@@ -2,7 +2,6 @@
 
 use super::context::SolveContext;
 use super::delassus::{ContactRows, Delassus};
-use super::held_rows::HeldRows;
 use super::improve::Around;
 use super::matrix_free::MatrixFree;
 use super::{Change, Slack};
@@ -77,8 +76,7 @@ fn a_product_without_the_matrix_is_that_of_the_matrix() {
         let contacts = &system.active;
         let response = &mut system.free.response;
         let Around { factors, context, .. } = around;
-        MatrixFree { contacts, bodies, factors, context, response, held: &HeldRows::default() }
-            .multiply(&v, &mut free);
+        MatrixFree { contacts, bodies, factors, context, response }.multiply(&v, &mut free);
         let largest = by_matrix.iter().fold(0.0f64, |a, b| a.max(b.abs()));
         for (a, b) in by_matrix.iter().zip(&free) {
             // Sums of some hundred terms.

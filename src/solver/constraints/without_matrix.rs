@@ -2,7 +2,7 @@
 //! cost more than the contacts are worth.
 
 use super::coarse_space::CoarseParts;
-use super::held_rows::HeldRows;
+use super::held_rows::Holding;
 use super::improve::{Around, LOOSE};
 use super::matrix_free::MatrixFree;
 use super::system::{Change, ContactSystem, FreeSolve};
@@ -85,8 +85,7 @@ impl ContactSystem {
             return;
         }
         let (contacts, FreeSolve { held, response, .. }) = (&self.active, &mut self.free);
-        let nothing = &HeldRows::default();
-        let mut operator = MatrixFree { contacts, bodies, factors, context, response, held: nothing };
+        let mut operator = MatrixFree { contacts, bodies, factors, context, response };
         let products = held.make(contacts, self.lambda.len(), &mut operator);
         self.work.products += products;
         self.spent.for_held += products;
@@ -114,14 +113,14 @@ impl ContactSystem {
     ) -> bool {
         self.before.clone_from(&self.lambda);
         let free = &mut self.free;
-        let mut operator = MatrixFree {
+        let product = MatrixFree {
             contacts: &self.active,
             bodies: &mut *bodies,
             factors,
             context,
             response: &mut free.response,
-            held: &free.held,
         };
+        let mut operator = Holding { operator: product, held: &free.held };
         let forces = [&mut self.lambda[..], &mut free.r[..]];
         let rough = ConeTolerance { relative: tolerance.relative.max(aim.error), ..tolerance };
         let done = free.method.solve(&free.metric, forces, rough, aim.budget, &mut operator);
