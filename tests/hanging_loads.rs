@@ -19,10 +19,12 @@ enum Held {
     Hangs,
 }
 
-/// A square metre of half a millimetre, 200 g with 441 vertices, and a box at the middle of one of its edges, at three of them.
+/// A square metre of half a millimetre, 200 g with 441 vertices, and a box at the middle of one of its edges.
 #[derive(Clone, Copy, Debug)]
 struct Load {
     held: Held,
+    /// Vertices that the box holds, along the edge and from it inward.
+    at: [usize; 2],
     /// Young's modulus \[Pa\].
     e: f64,
     /// Of the box \[kg\].
@@ -59,7 +61,10 @@ impl Load {
         let load = RigidBodyBuilder::dynamic().translation(Vector::X * (0.5 + HALF)).can_sleep(false);
         let density = self.mass / (2.0 * HALF).powi(3);
         let (load, _) = physics.insert(load, ColliderBuilder::cuboid(HALF, HALF, HALF).density(density));
-        let edge = world.bodies[body].vertices_where(|x| x.x > 0.4999 && x.z.abs() < 0.051);
+        // Vertices are 5 cm apart.
+        let [width, depth] = self.at.map(|count| 0.05 * (count - 1) as f32 + 1e-3);
+        let edge = world.bodies[body].vertices_where(|x| x.x > 0.5 - depth && x.z.abs() < 0.5 * width);
+        assert_eq!(edge.len(), self.at[0] * self.at[1]);
         let to_box = AttachTo::RigidBody(load, *physics.bodies[load].position());
         let attachment = world.bodies.attach(body, &edge, to_box).unwrap();
         let (mut rejected, mut carried, mut iterations) = (0, 0.0, 0);
@@ -81,7 +86,7 @@ impl Load {
 /// five times its weight. The cloth had one iteration a step, as one that hangs, not three.
 #[test]
 fn a_cloth_carries_a_box_over_the_edge_of_a_table() {
-    let load = Load { held: Held::PinnedOnTable, e: 1e7, mass: 3.6 };
+    let load = Load { held: Held::PinnedOnTable, at: [3, 1], e: 1e7, mass: 3.6 };
     let shown = load.run();
     println!("{load:?}: {shown:?}");
     let weight = f64::from(load.mass) * G;
@@ -90,13 +95,28 @@ fn a_cloth_carries_a_box_over_the_edge_of_a_table() {
     assert!(shown.iterations > 1, "touched, a pinned cloth has three iterations: {shown:?}");
 }
 
+/// More than twelve vertices went unsolved: of thirteen, nineteen and three rows of nine 97, 86 and 93 % of the steps were rejected.
+#[test]
+fn many_vertices_hold_a_box_as_few_do() {
+    let loads = [[13, 1], [19, 1], [9, 3]];
+    let loads = loads.map(|at| Load { held: Held::PinnedOnTable, at, e: 1e7, mass: 3.6 });
+    let shown: Vec<Shown> = loads.par_iter().map(|load| load.run()).collect();
+    for (load, shown) in loads.iter().zip(&shown) {
+        println!("{load:?}: {shown:?}");
+        let weight = f64::from(load.mass) * G;
+        assert!(shown.rejected < 0.15, "{load:?}: {shown:?}");
+        // What is held beside the box leans on the side of the table.
+        assert!((shown.carried - weight).abs() < 0.1 * weight, "{load:?}: {shown:?}, not {weight} N");
+    }
+}
+
 /// Once more than half of the steps of twelve were rejected, 45 % of all.
 #[test]
 #[ignore = "slow tier"]
 fn nearly_all_cloths_swing_with_their_boxes() {
     let all = [Held::Lies, Held::PinnedOnTable, Held::Hangs].into_iter();
     let all = all.flat_map(|held| [1e6, 1e7, 1e8, 1e9].map(|e| (held, e)));
-    let all = all.flat_map(|(held, e)| [0.1, 3.6].map(|mass| Load { held, e, mass }));
+    let all = all.flat_map(|(held, e)| [0.1, 3.6].map(|mass| Load { held, at: [3, 1], e, mass }));
     let all: Vec<Load> = all.collect();
     let shown: Vec<Shown> = all.par_iter().map(|load| load.run()).collect();
     for (load, shown) in all.iter().zip(&shown) {

@@ -177,11 +177,6 @@ impl ConstraintKey {
         }
     }
 
-    /// Whether it names a contact between deformable bodies.
-    pub fn is_soft_pair(&self) -> bool {
-        matches!(self, Self::SoftPair(_))
-    }
-
     /// Whether it names a constraint that belongs to an island and not to one body: of rigid bodies, of an attachment, a cable or a twisted rod.
     pub fn is_shared(&self) -> bool {
         match self {

@@ -44,10 +44,10 @@ impl CarriedNodes {
     }
 }
 
-/// Energy \[J\] that counts as none.
-fn negligible_energy(problem: &mut BodyProblem) -> f64 {
+/// Strain energy \[J\] that a solved step leaves to carrying, whatever the body holds.
+fn solved_strain(problem: &BodyProblem) -> f64 {
     let weight = problem.weight * problem.masses().len() as f64;
-    NEGLIGIBLE * problem.start_energy() + NEGLIGIBLE_WORK * weight * problem.model.surface.mean_edge
+    NEGLIGIBLE_WORK * weight * problem.model.surface.mean_edge
 }
 
 impl StepScratch {
@@ -82,9 +82,12 @@ impl StepScratch {
                 // What was rejected keeps its shape.
                 let may = error <= LEFT_OFF && !problem.is_rejected && carried.are_near(problem);
                 let strain = if may { carried.strain(problem).max(0.0) } else { 0.0 };
+                // The cheapest first: what is solved has next to nothing to strain, and each energy takes an evaluation.
                 let gains = |island: &mut Island| {
-                    island.would_gain_energy(local, strain, &context)
-                        && strain > negligible_energy(&mut island.bodies[local])
+                    let body = &mut island.bodies[local];
+                    strain > solved_strain(body)
+                        && strain > solved_strain(body) + NEGLIGIBLE * body.start_energy()
+                        && island.would_gain_energy(local, strain, &context)
                 };
                 if !may || gains(&mut work.island) {
                     carried.nodes.clear();

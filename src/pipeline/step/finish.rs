@@ -1,10 +1,7 @@
 //! The end of a step: the bodies store what was solved, and those that have been still fall asleep.
 
 use super::quarantine::quarantine;
-use super::readout::{
-    add_attachment_forces, add_cable_forces, add_twist_torques, list_contacts, list_pair_contacts,
-    list_rigid_forces,
-};
+use super::readout::{Lists, read_results};
 use super::scratch::StepScratch;
 use super::sleeping::LookAround;
 use super::work::IslandWork;
@@ -41,12 +38,13 @@ impl StepScratch {
             }
             if finite {
                 let handle_of = |local: usize| self.works[work.members[local]].handle;
-                list_contacts(work, handle_of, &mut self.contacts);
-                list_pair_contacts(work, handle_of, &mut self.pair_contacts);
-                add_attachment_forces(work, deformables);
-                add_cable_forces(work, deformables);
-                add_twist_torques(work, deformables);
-                list_rigid_forces(work, &mut self.rigid_contacts, &mut self.joint_forces);
+                let mut lists = Lists {
+                    contacts: &mut self.contacts,
+                    pair_contacts: &mut self.pair_contacts,
+                    rigid_contacts: &mut self.rigid_contacts,
+                    joint_forces: &mut self.joint_forces,
+                };
+                read_results(work, handle_of, deformables, &mut lists);
             }
             for (problem, &index) in work.island.bodies.drain(..).zip(&work.members) {
                 self.works[index].problem = Some(problem);

@@ -7,6 +7,7 @@ use crate::fem::StiffnessDamping;
 use crate::math::{Mat3, Vec3};
 use crate::solver::counters::SolveCounters;
 use crate::solver::linear::{FactorId, FactorKey, Preconditioner};
+use std::sync::Arc;
 
 impl BodyProblem {
     /// Of a body at the start of a step of `h` \[s\] under `gravity` [m/s²], with the nodes that attachments prescribe.
@@ -35,6 +36,7 @@ impl BodyProblem {
             v_start: Vec::new(),
             before: Default::default(),
             kinetic_bound: f64::INFINITY,
+            start_elastic: None,
             spin: Vec3::zeros(),
             target: Vec::new(),
             masses: Vec::new(),
@@ -68,6 +70,7 @@ impl BodyProblem {
 
     /// As [`BodyProblem::new`], in the memory of an earlier step.
     pub fn begin(&mut self, body: &DeformableBody, h: f64, gravity: &Vec3, prescribed: &[PrescribedNode]) {
+        self.note_start_elastic(body);
         // What its user has pinned stays there.
         let is_free =
             |node: &&PrescribedNode| body.pins.binary_search_by_key(&node.node, |p| p.node).is_err();
@@ -87,6 +90,23 @@ impl BodyProblem {
         self.is_attached = false;
         self.held_nodes.clear();
         self.read_body(body, gravity);
+    }
+
+    /// Keeps the elastic energy that the last step has found where this one starts, if nothing that it depends on is another.
+    fn note_start_elastic(&mut self, body: &DeformableBody) {
+        // What limits bring back and what is balanced has moved since its evaluation.
+        let is_pure = !self.is_xpbd()
+            && !self.was_limited()
+            && !self.key.pins.is_empty()
+            && !self.damping.resists()
+            && self.cavities.is_empty()
+            && self.twists.is_empty()
+            && Arc::ptr_eq(&self.model, &body.model);
+        let is_same = is_pure
+            && self.current.x == body.state.x
+            && self.materials == body.materials
+            && self.activations == body.activations;
+        self.start_elastic = is_same.then_some(self.current.elastic);
     }
 
     /// Begins again where the body is held, or may be touched: by generalized-α, if it is of the second order, and where it is touched

@@ -80,6 +80,8 @@ pub(crate) struct BodyProblem {
     pub(super) before: (Vec<Vec3>, Vec<Vec3>),
     /// What kinetic energy \[J\] a step leaves that has not converged; else any.
     pub(super) kinetic_bound: f64,
+    /// Elastic energy at the positions of the body \[J\], where the last step has found it.
+    pub(super) start_elastic: Option<f64>,
     /// Angular momentum at the start.
     pub(super) spin: Vec3,
     /// Where the nodes would go without internal and contact forces.
