@@ -96,7 +96,7 @@ mod touch;
 
 pub use adjoint::{
     CableGradient, DeformableGradient, DeformableLoss, DeformableTape, MaterialGradient, StepGradient,
-    WindGradient,
+    WindGradient, WovenGradient,
 };
 pub use body::{
     Acceleration, AttachTo, CablePoint, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,
@@ -148,7 +148,7 @@ pub mod prelude {
         Integrator, JointForce, JointMotorAxis, JointRole, MaterialGradient, MaxwellBranch, OrthotropicSheet,
         PhysicsParts, RigidContact, RigidRegion, RigidRegionBody, SolvedJoint, Solver, SolverSettings,
         StepGradient, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix, TactilePad, TactileReading,
-        TetMesh, WindGradient,
+        TetMesh, WindGradient, WovenGradient,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

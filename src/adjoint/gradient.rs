@@ -23,6 +23,23 @@ pub struct MaterialGradient {
     pub maxwell_times: [f64; MAX_BRANCHES],
     /// Per pascal of the fibres' modulus.
     pub fibre_modulus: f64,
+    /// Of what woven cloth has in its plane; zero of other materials. Young's modulus and Poisson's ratio above are those of its bending.
+    pub woven: WovenGradient,
+}
+
+/// Derivatives of a loss with respect to the elastic constants of woven cloth in its plane
+/// ([`OrthotropicSheet`](crate::OrthotropicSheet)).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct WovenGradient {
+    /// Per pascal of Young's modulus along the warp.
+    pub warp_modulus: f64,
+    /// Per pascal of Young's modulus along the weft.
+    pub weft_modulus: f64,
+    /// Of ν₁₂.
+    pub poisson_ratio: f64,
+    /// Per pascal of the shear modulus.
+    pub shear_modulus: f64,
 }
 
 /// Derivatives of a loss with respect to what drew a cable in one step.
@@ -105,6 +122,12 @@ impl DeformableGradient {
             maxwell_ratios: std::array::from_fn(|k| sum.maxwell_ratios[k] + m.maxwell_ratios[k]),
             maxwell_times: std::array::from_fn(|k| sum.maxwell_times[k] + m.maxwell_times[k]),
             fibre_modulus: sum.fibre_modulus + m.fibre_modulus,
+            woven: WovenGradient {
+                warp_modulus: sum.woven.warp_modulus + m.woven.warp_modulus,
+                weft_modulus: sum.woven.weft_modulus + m.woven.weft_modulus,
+                poisson_ratio: sum.woven.poisson_ratio + m.woven.poisson_ratio,
+                shear_modulus: sum.woven.shear_modulus + m.woven.shear_modulus,
+            },
         })
     }
 

@@ -20,6 +20,8 @@ mod backward;
 mod tape;
 mod wind;
 
-pub use gradient::{CableGradient, DeformableGradient, MaterialGradient, StepGradient, WindGradient};
+pub use gradient::{
+    CableGradient, DeformableGradient, MaterialGradient, StepGradient, WindGradient, WovenGradient,
+};
 pub use loss::DeformableLoss;
 pub use tape::DeformableTape;

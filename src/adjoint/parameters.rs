@@ -2,11 +2,11 @@
 //! themselves, so that they hold for every energy. In moduli and activation forces are linear, and differences exact, but where
 //! regions meet: there they are of the fourth order. Those of Poisson's ratio are small.
 
-use super::gradient::MaterialGradient;
+use super::gradient::{MaterialGradient, WovenGradient};
 use super::record::StepRecord;
 use crate::fem::elastic_forces::{Evaluation, add_forces};
 use crate::fem::{DeformableModel, Elements, StiffnessDamping};
-use crate::material::DeformableMaterial;
+use crate::material::{DeformableMaterial, OrthotropicSheet};
 use crate::math::{Mat3, Vec3, dot};
 
 /// Differences of moduli, relative to Young's, of activation, and of what resists beside branches, relative to itself.
@@ -97,10 +97,12 @@ impl ElasticWork<'_> {
 
     /// Adds the derivatives with respect to what is elastic in the materials.
     pub fn add_materials(&mut self, out: &mut [MaterialGradient]) {
-        // Of one material without fibres all forces are in proportion to it.
-        let moduli = match (out.len(), self.model.has_fibres()) {
-            (1, false) => &[],
-            (1, true) => LINEAR,
+        // Of one material without fibres or weave all forces are in proportion to it.
+        let is_alone =
+            !self.model.has_fibres() && self.record.materials.iter().all(|m| m.orthotropic.is_none());
+        let moduli = match (out.len(), is_alone) {
+            (1, true) => &[],
+            (1, false) => LINEAR,
             _ => CENTRAL,
         };
         for (region, out) in out.iter_mut().enumerate() {
@@ -116,10 +118,30 @@ impl ElasticWork<'_> {
             let scheme = if poisson_ratio > apart { LINEAR } else { FORWARD };
             out.poisson_ratio += self.along(region, apart, scheme, |m, d| m.poisson_ratio += d);
             self.add_damping(region, out);
+            self.add_weave(region, &mut out.woven);
             if self.model.has_fibres() {
                 out.fibre_modulus += self.along(region, by, LINEAR, |m, d| m.fibre_modulus += d);
             }
         }
+    }
+
+    /// Adds the elastic constants of woven cloth. Its stiffness goes with 1/(1 − ν₁₂ν₂₁): differences are relative to the distance from one,
+    /// as ν₁₂ν₂₁ goes with the moduli and with ν₁₂².
+    fn add_weave(&mut self, region: usize, out: &mut WovenGradient) {
+        let Some(weave) = self.record.materials[region].orthotropic else { return };
+        let apart = DIFFERENCE * (1.0 - weave.coupling());
+        type Constant = fn(&mut OrthotropicSheet) -> &mut f64;
+        let mut along = |by: f64, constant: Constant| {
+            self.along(region, by, CENTRAL, |m, d| {
+                if let Some(sheet) = &mut m.orthotropic {
+                    *constant(sheet) += d;
+                }
+            })
+        };
+        out.warp_modulus += along(apart * weave.warp_modulus, |sheet| &mut sheet.warp_modulus);
+        out.weft_modulus += along(apart * weave.weft_modulus, |sheet| &mut sheet.weft_modulus);
+        out.poisson_ratio += along(apart, |sheet| &mut sheet.poisson_ratio);
+        out.shear_modulus += along(DIFFERENCE * weave.shear_modulus, |sheet| &mut sheet.shear_modulus);
     }
 
     /// Adds what resists motion says, with what dampers have given way by as it is.

@@ -162,7 +162,6 @@ fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
             is_thin_damped(body),
             "stiffness damping and Maxwell branches of sheets, rods, springs and fibres have none",
         ),
-        (body.materials.iter().any(|m| m.orthotropic.is_some()), "woven sheets have none"),
     ];
     why.iter().find(|(is_so, _)| *is_so).map_or(Ok(()), |(_, what)| Err(*what))
 }

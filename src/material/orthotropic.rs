@@ -24,7 +24,7 @@ const LARGEST_COUPLING: f64 = 0.9999;
 
 impl OrthotropicSheet {
     /// ν₁₂ν₂₁.
-    fn coupling(&self) -> f64 {
+    pub(crate) fn coupling(&self) -> f64 {
         self.poisson_ratio * self.poisson_ratio * self.weft_modulus / self.warp_modulus
     }
 
