@@ -158,23 +158,17 @@ fn check_body(body: &DeformableBody) -> Result<(), &'static str> {
         (body.body_type() != RigidBodyType::Dynamic, "the body is not dynamic"),
         (body.settings().integrator != Integrator::ImplicitEuler, "only implicit Euler has one"),
         (body.settings().solver == Solver::Xpbd, "position-based dynamics does not end at a minimum"),
-        (
-            is_thin_damped(body),
-            "stiffness damping and Maxwell branches of sheets, rods, springs and fibres have none",
-        ),
+        (is_woven_damped(body), "stiffness damping and Maxwell branches of woven sheets have none"),
     ];
     why.iter().find(|(is_so, _)| *is_so).map_or(Ok(()), |(_, what)| Err(*what))
 }
 
-/// Whether what is thin in a body has stiffness damping or Maxwell branches.
-fn is_thin_damped(body: &DeformableBody) -> bool {
-    let is_damped = |region: u32| {
-        let material = &body.materials[region as usize];
-        material.stiffness_damping != 0.0 || material.branch_count() > 0
-    };
-    let model = body.model();
-    model.triangles.iter().any(|triangle| is_damped(triangle.region))
-        || model.stencils.iter().any(|stencil| stencil.mean(|region| f64::from(is_damped(region))) != 0.0)
+/// Whether woven sheets of a body have stiffness damping or Maxwell branches.
+fn is_woven_damped(body: &DeformableBody) -> bool {
+    body.model().triangles.iter().any(|triangle| {
+        let material = &body.materials[triangle.region as usize];
+        material.orthotropic.is_some() && (material.stiffness_damping != 0.0 || material.branch_count() > 0)
+    })
 }
 
 fn check_step(body: &DeformableBody, solved: &SolvedBody<'_>) -> Result<(), &'static str> {

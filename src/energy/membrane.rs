@@ -95,44 +95,22 @@ impl Membrane {
         if let Some(woven) = &self.woven {
             return self.woven_modes(woven, F);
         }
-        let (U, s, V) = principal_axes(F);
-        let trace = s[0] + s[1] - 2.0;
-        let mut slope = s.map(|s| 2.0 * self.mu * (s - 1.0) + self.lambda * trace);
-        let mut curvature = Mat2::from_diagonal_element(2.0 * self.mu) + Mat2::repeat(self.lambda);
-        for k in 0..2 {
-            let beyond = self.limits.map_or(0.0, |limits| excess(s[k], limits));
-            slope[k] += self.limit_weight * beyond;
-            curvature[(k, k)] += if beyond == 0.0 { 0.0 } else { self.limit_weight };
-        }
-        let basis = |i: usize, j: usize| U[i] * V.column(j).transpose();
-        let normal = U[0].cross(&U[1]);
-        let stretching = curvature.symmetric_eigen();
-        let stretch = |k: usize| {
-            let e = stretching.eigenvectors.column(k);
-            let shape = basis(0, 0) * e[0] + basis(1, 1) * e[1];
-            MembraneMode { stiffness: stretching.eigenvalues[k], shape }
-        };
-        let size = s[0].max(s[1]).max(COLLAPSED);
-        let half = std::f64::consts::FRAC_1_SQRT_2;
-        let difference = s[0] - s[1];
-        let shear = if difference.abs() > 1e-7 * size {
-            (slope[0] - slope[1]) / difference
-        } else {
-            0.5 * (curvature[(0, 0)] + curvature[(1, 1)]) - curvature[(0, 1)]
-        };
-        let turn = (slope[0] + slope[1]) / (s[0] + s[1]).max(COLLAPSED * size);
-        let tilt = |k: usize| MembraneMode {
-            stiffness: slope[k] / s[k].max(COLLAPSED * size),
-            shape: normal * V.column(k).transpose(),
-        };
-        [
-            stretch(0),
-            stretch(1),
-            MembraneMode { stiffness: shear, shape: (basis(0, 1) + basis(1, 0)) * half },
-            MembraneMode { stiffness: turn, shape: (basis(0, 1) - basis(1, 0)) * half },
-            tilt(0),
-            tilt(1),
-        ]
+        isotropic_modes(F, |s| {
+            let trace = s[0] + s[1] - 2.0;
+            let mut slope = s.map(|s| 2.0 * self.mu * (s - 1.0) + self.lambda * trace);
+            let mut curvature = Mat2::from_diagonal_element(2.0 * self.mu) + Mat2::repeat(self.lambda);
+            for k in 0..2 {
+                let beyond = self.limits.map_or(0.0, |limits| excess(s[k], limits));
+                slope[k] += self.limit_weight * beyond;
+                curvature[(k, k)] += if beyond == 0.0 { 0.0 } else { self.limit_weight };
+            }
+            (slope, curvature)
+        })
+    }
+
+    /// μ and λ̄, if it is not woven.
+    pub fn moduli(&self) -> Option<[f64; 2]> {
+        self.woven.is_none().then_some([self.mu, self.lambda])
     }
 
     /// The same of woven cloth, whose stress has other axes than its stretch: those in the plane by the eigenvectors of all four.
@@ -185,6 +163,41 @@ impl Membrane {
     pub fn laplacian_weights(&self) -> [f64; 2] {
         self.woven.as_ref().map_or([2.0 * self.mu + 0.5 * self.lambda; 2], PlaneStress::weights)
     }
+}
+
+/// The Hessian over F of an energy of the two principal stretches, with its slopes along them and its curvature there.
+pub(crate) fn isotropic_modes(F: &Mat3x2, of: impl Fn([f64; 2]) -> ([f64; 2], Mat2)) -> [MembraneMode; 6] {
+    let (U, s, V) = principal_axes(F);
+    let (slope, curvature) = of(s);
+    let basis = |i: usize, j: usize| U[i] * V.column(j).transpose();
+    let normal = U[0].cross(&U[1]);
+    let stretching = curvature.symmetric_eigen();
+    let stretch = |k: usize| {
+        let e = stretching.eigenvectors.column(k);
+        let shape = basis(0, 0) * e[0] + basis(1, 1) * e[1];
+        MembraneMode { stiffness: stretching.eigenvalues[k], shape }
+    };
+    let size = s[0].max(s[1]).max(COLLAPSED);
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let difference = s[0] - s[1];
+    let shear = if difference.abs() > 1e-7 * size {
+        (slope[0] - slope[1]) / difference
+    } else {
+        0.5 * (curvature[(0, 0)] + curvature[(1, 1)]) - curvature[(0, 1)]
+    };
+    let turn = (slope[0] + slope[1]) / (s[0] + s[1]).max(COLLAPSED * size);
+    let tilt = |k: usize| MembraneMode {
+        stiffness: slope[k] / s[k].max(COLLAPSED * size),
+        shape: normal * V.column(k).transpose(),
+    };
+    [
+        stretch(0),
+        stretch(1),
+        MembraneMode { stiffness: shear, shape: (basis(0, 1) + basis(1, 0)) * half },
+        MembraneMode { stiffness: turn, shape: (basis(0, 1) - basis(1, 0)) * half },
+        tilt(0),
+        tilt(1),
+    ]
 }
 
 /// The R of orthonormal columns in `F = R S`, S symmetric and not negative: `S = (C + √det C·I)/tr S` with

@@ -1,9 +1,11 @@
-//! Second derivatives of stiffness damping and Maxwell branches, of solids: what gradients over steps need of them.
+//! Second derivatives of stiffness damping and Maxwell branches, of solids: what gradients over steps need of them. Those of what is thin
+//! are in [`super::damped_thin`].
 //!
 //! With the stretch S at the start of the step the density is, per β/h, `μ(‖F‖² + ‖S‖²) − 2μ N(FS) + λ/2 (N(F) − tr S)²`, with the
 //! sum N of the (signed) principal stretches: that of F and that of FS are isotropic, and have the modes of such energies
 //! [Smith et al. 2019].
 
+use super::damped_thin;
 use super::model::Elements;
 use super::solid_elements::{Law, SolidElement};
 use super::stiffness_damping::StiffnessDamping;
@@ -48,6 +50,7 @@ pub(crate) fn add_damping_tangents(
         add_modes(&damped.modes_of_gradient(), &Mat3::identity());
         add_modes(&damped.modes_of_stretched(), &damped.stretch);
     });
+    damped_thin::add_tangents(elements, damping, x, sides, add);
 }
 
 /// What a step of `h` \[s\] sets out from.
@@ -79,6 +82,7 @@ impl DampedStep<'_> {
                 nodes.iter().zip(gradients).for_each(|(n, g)| of_start[*n as usize] += of_gradient * g);
             }
         });
+        self.add_by_start_of_thin(z, of_start, of_dampers);
     }
 
     /// Goes through how the dampers give way, `D′ = (τ D + h S′)/(τ + h)`: what is with respect to D′ becomes that with respect to D; adds what is of
@@ -116,6 +120,7 @@ impl DampedStep<'_> {
             let ends = element.nodes.iter().zip(element.gradients);
             ends.for_each(|(n, g)| of_end[*n as usize] += of_gradient * g);
         });
+        self.give_way_back_of_thin(of_dampers, of_end, of_times);
     }
 }
 
@@ -202,7 +207,7 @@ mod tests {
     use super::*;
     use crate::energy::Elasticity;
     use crate::material::DeformableMaterial;
-    use crate::mesh::TetMesh;
+    use crate::mesh::{Structure, TetMesh};
     use proptest::prelude::*;
 
     /// Forces at `x` with damping from `x_start`, at steps of 1 s.
@@ -213,6 +218,14 @@ mod tests {
         let at = Evaluation { damping: &damping, x, frame: &Mat3::identity(), limit: f64::INFINITY };
         add_forces(elements, &at, &mut f);
         f
+    }
+
+    /// A block with a bent skin, a rope and a spring, in two regions.
+    fn with_thin_parts(block: &TetMesh) -> DeformableModel {
+        let skinned = Structure::solid(block).with_sheet(&[[0, 1, 2], [1, 2, 5], [1, 5, 6]], 0.01).unwrap();
+        let roped = skinned.rod_from(0, &[[-0.2, 0.1, 0.0], [-0.3, 0.1, 0.1]], 0.01).unwrap();
+        let sprung = roped.with_spring([0, 3], 1e-3).unwrap();
+        DeformableModel::from_structure(&sprung).unwrap().painted(|[_, _, z]| u32::from(z > 0.0))
     }
 
     fn shaken(rest: &[Vec3], shakes: &[f64]) -> Vec<Vec3> {
@@ -230,7 +243,7 @@ mod tests {
         ) {
             let block = TetMesh::cuboid([0.1; 3], [1, 1, 2]).unwrap();
             let in_two = DeformableModel::new(&block).painted(|[_, _, z]| u32::from(z > 0.0));
-            for model in [in_two.clone(), in_two.smoothed()] {
+            for model in [in_two.clone(), in_two.smoothed(), with_thin_parts(&block)] {
                 let material = DeformableMaterial::new(1e3, 0.3).elasticity(Elasticity::ALL[0]);
                 // Of the second region the energy is the same without damping; ν = 0 has no patches.
                 let materials = [material.stiffness_damping(beta), material.poisson_ratio(0.0)];

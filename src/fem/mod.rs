@@ -36,6 +36,7 @@ pub(crate) mod constant_matrix;
 mod tangents;
 
 mod damped_tangents;
+mod damped_thin;
 
 pub use cavities::DeformableCavity;
 pub(crate) use compliant::ElementMultipliers;

@@ -31,13 +31,14 @@ impl Stretches {
         self.lengths.clear();
     }
 
-    /// As many as of solid elements of a model, all of them zero.
+    /// As many as of a model's elements, all of them zero.
     pub fn zeros(model: &DeformableModel) -> Self {
         let zero = LaneMat3(std::array::from_fn(|_| Lane::splat(0.0)));
         Self {
             solid: vec![zero; solid_blocks(model)],
             patches: vec![zero; model.volume_domains.block_count()],
-            ..Self::default()
+            sheets: vec![Mat2::zeros(); model.triangles.len()],
+            lengths: vec![0.0; model.stencils.len()],
         }
     }
 
