@@ -6,7 +6,7 @@ use crate::handles::{PyCableHandle, PyColliderHandle, PyDeformableHandle};
 use crate::world::{Inner, World, here, in_turns, step_with};
 use foible3d::{
     CableGradient, DeformableGradient, DeformableLoss, DeformableTape, DeformableWorld, MaterialGradient,
-    StepGradient, WindGradient,
+    StepGradient, WindGradient, WovenGradient,
 };
 use numpy::{PyArray1, PyArray3};
 use pyo3::prelude::*;
@@ -326,7 +326,8 @@ impl PyGradient {
     }
 
     /// With respect to the materials of the regions, in the order of ``DeformableBody.regions``: arrays of shape (k,) by the names of ``Material``,
-    /// and of shape (k, 4) ``maxwell_ratios`` and ``maxwell_times`` of the branches.
+    /// and of shape (k, 4) ``maxwell_ratios`` and ``maxwell_times`` of the branches and ``sheet`` of woven cloth: of its moduli along warp and weft,
+    /// Poisson's ratio and shear modulus.
     #[getter]
     fn materials<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = PyDict::new(py);
@@ -339,6 +340,11 @@ impl PyGradient {
         found.set_item("maxwell_ratios", rows(py, materials.clone().map(|m| m.maxwell_ratios).collect())?)?;
         found.set_item("maxwell_times", rows(py, materials.map(|m| m.maxwell_times).collect())?)?;
         found.set_item("fibre_modulus", self.by_region(py, |m| m.fibre_modulus))?;
+        let sheet = |m: &MaterialGradient| {
+            let WovenGradient { warp_modulus, weft_modulus, poisson_ratio, shear_modulus, .. } = m.woven;
+            [warp_modulus, weft_modulus, poisson_ratio, shear_modulus]
+        };
+        found.set_item("sheet", rows(py, self.0.materials.iter().map(sheet).collect())?)?;
         Ok(found)
     }
 

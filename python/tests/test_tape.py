@@ -170,6 +170,31 @@ def test_maxwell_branches_have_gradients():
     assert not found["maxwell_ratios"][0, 2:].any()
 
 
+def test_woven_cloth_has_gradients():
+    def loss(warp, shear):
+        world = f.World()
+        # Poisson's ratio of bending would go with the moduli.
+        woven = f.Material.orthotropic_sheet(warp, 2.5e4, 0.4, shear).replace(youngs_modulus=6e4, poisson_ratio=0.2, mass_damping=1.0)
+        cloth = f.DeformableBody.cloth((0.25, 0.25), (4, 4), 0.01, warp=(1, 0, 0.4), material=woven, fidelity=f.Fidelity.REFERENCE,
+                                       can_sleep=False, tolerance=1e-12, max_iterations=400)
+        handle = world.add_deformable(cloth.pinned(lambda x: x[:, 0] < -0.249))
+        body = world.deformable_bodies[handle]
+        tip = int(body.positions[:, 0].argmax())
+        tape = f.Tape(world, handle)
+        tape.step(STEPS)
+        return body.positions[tip, 1], body, tape, tip
+
+    _, body, tape, tip = loss(1e5, 2e4)
+    of_positions = np.zeros((body.vertex_count, 3))
+    of_positions[tip, 1] = 1.0
+    found = tape.backward(positions={-1: of_positions}).materials["sheet"]
+    assert found.shape == (1, 4)
+    of_warp = (loss(1.001e5, 2e4)[0] - loss(0.999e5, 2e4)[0]) / 200
+    of_shear = (loss(1e5, 2.002e4)[0] - loss(1e5, 1.998e4)[0]) / 40
+    assert found[0, 0] == pytest.approx(of_warp, rel=1e-4) and of_warp != 0.0
+    assert found[0, 3] == pytest.approx(of_shear, rel=1e-4) and of_shear != 0.0
+
+
 def test_checkpoints_replay_to_the_same_numbers():
     def push(step, world):
         ((_, body),) = world.deformable_bodies
