@@ -3,7 +3,7 @@
 #[path = "common/differences.rs"]
 mod differences;
 
-use differences::{FRICTION, LAUNCH, LOADS, MATERIAL, PINS, Parameter, Run, Scene};
+use differences::{DAMPING, FRICTION, LAUNCH, LOADS, MATERIAL, PINS, Parameter, Run, Scene};
 use differences::{force_error, state_error};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
@@ -15,13 +15,6 @@ const IN_CONTACT: f64 = 1e-3;
 
 /// At steps of 1/60 s damping resists with 0.6 of the stiffness.
 const BETA: f64 = 0.01;
-
-const DAMPING: Parameter = Parameter {
-    name: "stiffness damping",
-    by: 1e-5,
-    change: |run, d| run.material.stiffness_damping += d,
-    of: |g, _| g.material().stiffness_damping,
-};
 
 fn damped() -> DeformableMaterial {
     DeformableMaterial::new(1.0e5, 0.3).mass_damping(1.0).stiffness_damping(BETA)

@@ -3,7 +3,7 @@
 #[path = "common/differences.rs"]
 mod differences;
 
-use differences::{FRICTION, LAUNCH, LOADS, MATERIAL, PINS, Parameter, Run, Scene};
+use differences::{BRANCHES, DAMPING, FRICTION, LAUNCH, LOADS, MATERIAL, PINS, Parameter, Run, Scene};
 use differences::{force_error, state_error};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
@@ -12,40 +12,6 @@ use std::sync::Arc;
 /// What differences of the fourth order leave; in contact, slips enter through the shifts of the last solve.
 const EXACT: f64 = 1e-5;
 const IN_CONTACT: f64 = 1e-3;
-
-const BRANCHES: [Parameter; 4] = [
-    Parameter {
-        name: "ratio",
-        by: 1e-3,
-        change: |run, d| run.material.maxwell_branches[0].ratio += d,
-        of: |g, _| g.material().maxwell_ratios[0],
-    },
-    Parameter {
-        name: "time",
-        by: 1e-4,
-        change: |run, d| run.material.maxwell_branches[0].time += d,
-        of: |g, _| g.material().maxwell_times[0],
-    },
-    Parameter {
-        name: "second ratio",
-        by: 1e-3,
-        change: |run, d| run.material.maxwell_branches[1].ratio += d,
-        of: |g, _| g.material().maxwell_ratios[1],
-    },
-    Parameter {
-        name: "second time",
-        by: 1e-3,
-        change: |run, d| run.material.maxwell_branches[1].time += d,
-        of: |g, _| g.material().maxwell_times[1],
-    },
-];
-
-const DAMPING: Parameter = Parameter {
-    name: "stiffness damping",
-    by: 1e-5,
-    change: |run, d| run.material.stiffness_damping += d,
-    of: |g, _| g.material().stiffness_damping,
-};
 
 /// Times of three steps and of the whole run.
 fn relaxing() -> DeformableMaterial {

@@ -354,6 +354,41 @@ pub const FRICTION: Parameter = Parameter {
     of: |g, _| g.friction,
 };
 
+pub const DAMPING: Parameter = Parameter {
+    name: "stiffness damping",
+    by: 1e-5,
+    change: |run, d| run.material.stiffness_damping += d,
+    of: |g, _| g.material().stiffness_damping,
+};
+
+/// Ratio and time of the first and of the second Maxwell branch.
+pub const BRANCHES: [Parameter; 4] = [
+    Parameter {
+        name: "ratio",
+        by: 1e-3,
+        change: |run, d| run.material.maxwell_branches[0].ratio += d,
+        of: |g, _| g.material().maxwell_ratios[0],
+    },
+    Parameter {
+        name: "time",
+        by: 1e-4,
+        change: |run, d| run.material.maxwell_branches[0].time += d,
+        of: |g, _| g.material().maxwell_times[0],
+    },
+    Parameter {
+        name: "second ratio",
+        by: 1e-3,
+        change: |run, d| run.material.maxwell_branches[1].ratio += d,
+        of: |g, _| g.material().maxwell_ratios[1],
+    },
+    Parameter {
+        name: "second time",
+        by: 1e-3,
+        change: |run, d| run.material.maxwell_branches[1].time += d,
+        of: |g, _| g.material().maxwell_times[1],
+    },
+];
+
 /// The largest relative error of the tape's derivatives against differences of the fourth order between whole runs.
 pub fn largest_error<'a>(
     scene: &Scene,
