@@ -108,6 +108,30 @@ fn damped_muscles_have_gradients() {
     }
 }
 
+/// Springs of a network, rods that are held against roll, and sheets beyond their limits of strain.
+#[test]
+fn damped_networks_twisted_rods_and_stretched_sheets_have_gradients() {
+    let mesh = TetMesh::cuboid([0.25, 0.0625, 0.0625], [4, 1, 1]).unwrap();
+    let network =
+        DeformableBodyBuilder::structure(&Structure::spring_network(&mesh)).pinned(|x| x.x < -0.249);
+    let rod = DeformableBodyBuilder::structure(&rope()).pinned(|x| x.x < 0.001);
+    let stretched = DeformableBodyBuilder::structure(&sheet(1.0)).pinned(|x| x.x < 0.001);
+    for (material, own) in materials() {
+        let limited = material.strain_limits(0.9, 1.02);
+        let [gentle, hard] = [0.0625, 4.0].map(|push| Run { push, ..Run::of(material) });
+        for (builder, run) in [
+            (&network, gentle),
+            (&rod, Run { roll: Some(1.0), ..gentle }),
+            (&stretched, Run { material: limited, ..hard }),
+        ] {
+            let scene = Scene { stride: FINE, ..Scene::new(builder.clone()) };
+            let moduli = MATERIAL.iter().filter(|p| p.name != "Poisson's ratio");
+            let error = state_error(&scene, &run, moduli.chain(&LOADS).chain(&own).chain([&PINS]));
+            assert!(error < EXACT, "{run:?}: {error:e}");
+        }
+    }
+}
+
 /// What bends is between two regions, of which each resists by its own.
 #[test]
 fn one_region_may_be_damped_more_than_another() {
