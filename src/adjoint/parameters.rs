@@ -98,9 +98,9 @@ impl ElasticWork<'_> {
     /// Adds the derivatives with respect to what is elastic in the materials.
     pub fn add_materials(&mut self, out: &mut [MaterialGradient]) {
         // Of one material without fibres or weave all forces are in proportion to it.
-        let is_alone =
+        let is_in_proportion =
             !self.model.has_fibres() && self.record.materials.iter().all(|m| m.orthotropic.is_none());
-        let moduli = match (out.len(), is_alone) {
+        let moduli = match (out.len(), is_in_proportion) {
             (1, true) => &[],
             (1, false) => LINEAR,
             _ => CENTRAL,

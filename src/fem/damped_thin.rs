@@ -11,7 +11,7 @@ use super::tangents::add_products;
 use super::thin_elements::{length_energy, membrane};
 use crate::energy::membrane::{MembraneMode, isotropic_modes, polar_factor, principal_axes};
 use crate::energy::stencil::LengthEnergy;
-use crate::material::{DeformableMaterial, MAX_BRANCHES, MaxwellBranch};
+use crate::material::{DeformableMaterial, MAX_BRANCHES};
 use crate::math::{Mat2, Mat3, Mat3x2, Vec3};
 
 /// A triangle that is damped.
@@ -128,9 +128,8 @@ impl DampedStep<'_> {
             let b = stencil.vector(self.x_end);
             let mut of_length = 0.0;
             for (k, of) in of_dampers.iter_mut().enumerate() {
-                let branch =
-                    |region: u32| -> MaxwellBranch { materials[region as usize].maxwell_branches[k] };
-                let share = h / (stencil.mean(|region| branch(region).time) + h);
+                let time = stencil.mean(|region| materials[region as usize].maxwell_branches[k].time);
+                let share = h / (time + h);
                 let of = &mut of.lengths[place];
                 of_length += *of * share;
                 let of_time = *of * (dampers[k].lengths[place] - b.norm()) * share * share / h;

@@ -85,8 +85,9 @@ impl StepScratch {
                 // The cheapest first: what is solved has next to nothing to strain, and each energy takes an evaluation.
                 let gains = |island: &mut Island| {
                     let body = &mut island.bodies[local];
-                    strain > solved_strain(body)
-                        && strain > solved_strain(body) + NEGLIGIBLE * body.start_energy()
+                    let solved = solved_strain(body);
+                    strain > solved
+                        && strain > solved + NEGLIGIBLE * body.start_energy()
                         && island.would_gain_energy(local, strain, &context)
                 };
                 if !may || gains(&mut work.island) {
