@@ -9,12 +9,13 @@
 //!
 //! A node that sticks with its one contact moves by nothing but its partner: it is taken out of the unknowns as a pinned one is.
 //!
-//! With `C = ∂F₂/∂x′` and `D = ∂F₂/∂λ` the adjoint is `H z = g + Cᵀq`, `(J H⁻¹ Cᵀ + Dᵀ) q = −g_λ − J H⁻¹ g`. Normals, and the
-//! weights of points within triangles and edges, count as constant.
+//! With `C = ∂F₂/∂x′` and `D = ∂F₂/∂λ` the adjoint is `H z = g + Cᵀq`, `(J H⁻¹ Cᵀ + Dᵀ) q = −g_λ − J H⁻¹ g`. Normals and weights are
+//! those of the start of the step; between deformable bodies they depend on it (`src/adjoint/pair_geometry.rs`), with colliders they count as
+//! constant. Nodes are those of all bodies in one row.
 
-use super::backward::OfForces;
-use super::record::{ContactRecord, NodeVectors};
-use super::tangent::Tangent;
+use super::contact_record::{ContactRecord, Partner};
+use super::record::NodeVectors;
+use super::tangents::Tangents;
 use crate::math::Vec3;
 use nalgebra::{DMatrix, DVector};
 
@@ -36,7 +37,8 @@ struct Row {
 }
 
 /// The rows of a step.
-pub(super) struct ContactRows {
+pub(super) struct ContactRows<'a> {
+    contacts: Vec<(&'a ContactRecord, Vec3)>,
     rows: Vec<Row>,
     /// The first that is a cable's.
     cables_from: usize,
@@ -50,39 +52,37 @@ pub(super) struct ContactShare {
     /// `Cᵀq` by nodes, pinned ones too.
     pub of_end: Vec<Vec3>,
     pub of_start: Vec<Vec3>,
-    pub of_friction: f64,
+    /// Of where nodes would go without contact.
+    pub of_targets: Vec<Vec3>,
+    /// Of each contact's coefficient of friction.
+    pub of_friction: Vec<(usize, Partner, f64)>,
     /// Of the lengths of cables.
     pub of_cables: Vec<f64>,
 }
 
-impl ContactRows {
-    pub fn new(contacts: &[&ContactRecord], of: &OfForces<'_>) -> Self {
-        let count = contacts.iter().map(|contact| contact.dimension()).sum();
+impl<'a> ContactRows<'a> {
+    /// Of contacts, with what the loss says of the forces of each.
+    pub fn new(contacts: Vec<(&'a ContactRecord, Vec3)>) -> Self {
+        let count = contacts.iter().map(|(contact, _)| contact.dimension()).sum();
         let (mut rows, mut of_forces) = (Vec::with_capacity(count), DMatrix::zeros(count, count));
-        for &contact in contacts {
+        for (contact, of_contact) in &contacts {
             let first = rows.len();
             let [normal, tangents @ ..] = contact.frame;
-            let of_start = if contact.recovers { -1.0 } else { 0.0 };
-            let of_contact = of.of_collider(contact.collider);
-            let laid = |direction: Vec3| -> NodeVectors {
-                contact.weighted_nodes().map(|(node, weight)| (node, direction * weight)).collect()
-            };
             let row = |direction: Vec3, of_start: f64| Row {
-                acts: laid(direction),
-                looks: laid(direction),
+                acts: contact.laid(direction),
+                looks: contact.laid(direction),
                 of_force: of_contact.dot(&direction),
                 of_start,
                 of_friction: 0.0,
             };
-            rows.push(row(normal, of_start));
+            rows.push(row(normal, if contact.recovers { -1.0 } else { 0.0 }));
             for tangent in tangents.into_iter().take(contact.dimension() - 1) {
                 let mut row = row(tangent, -1.0);
                 if let Some(slip) = contact.slip {
                     let (length, pressed) = (slip.norm(), normal.dot(&contact.force));
-                    let direction = slip / length;
-                    let along = direction.dot(&tangent);
+                    let along = slip.dot(&tangent) / length;
                     let scale = length / (contact.friction * pressed);
-                    row.looks = laid(tangent - direction * along);
+                    row.looks = contact.laid(contact.looks_along(&tangent));
                     row.of_friction = scale * pressed * along;
                     of_forces[(rows.len(), first)] = scale * contact.friction * along;
                     of_forces[(rows.len(), rows.len())] = scale;
@@ -90,7 +90,7 @@ impl ContactRows {
                 rows.push(row);
             }
         }
-        Self { cables_from: rows.len(), rows, of_forces }
+        Self { contacts, cables_from: rows.len(), rows, of_forces }
     }
 
     /// Adds that a cable, a newton of which acts so, is held at a length; with its stretch per tension [m/N].
@@ -102,12 +102,18 @@ impl ContactRows {
     }
 
     /// Solves for z in place of `g`, zero at pinned nodes. `None` if it cannot be.
-    pub fn solve(&self, tangent: &mut Tangent, is_free: &[bool], g: &mut [Vec3]) -> Option<ContactShare> {
+    pub fn solve(
+        &self,
+        tangents: &mut Tangents<'_>,
+        is_free: &[bool],
+        g: &mut [Vec3],
+    ) -> Option<ContactShare> {
         let (count, n) = (self.rows.len(), g.len());
         let mut share = ContactShare { of_end: vec![Vec3::zeros(); n], ..Default::default() };
         share.of_start = share.of_end.clone();
+        share.of_targets = share.of_end.clone();
         if count == 0 {
-            return solve_one(tangent, g).then_some(share);
+            return solve_one(tangents, g).then_some(share);
         }
         // H⁻¹ Jᵀ.
         let mut columns = vec![0.0; 3 * n * count];
@@ -116,7 +122,7 @@ impl ContactRows {
                 (0..3).for_each(|k| column[3 * node + k] += acts[k]);
             }
         }
-        tangent.solve(&mut columns).then_some(())?;
+        tangents.solve(&mut columns).then_some(())?;
         let columns: Vec<&[f64]> = columns.chunks_exact(3 * n).collect();
         let mut matrix = self.of_forces.transpose();
         let mut rhs = DVector::zeros(count);
@@ -130,7 +136,6 @@ impl ContactRows {
         }
         let q = solve_dense(matrix, &rhs)?;
         for (row, q) in self.rows.iter().zip(&q) {
-            share.of_friction += q * row.of_friction;
             for (node, looks) in &row.looks {
                 share.of_end[*node] += looks * *q;
                 share.of_start[*node] += looks * (q * row.of_start);
@@ -140,13 +145,31 @@ impl ContactRows {
         for ((g, c), _) in g.iter_mut().zip(&share.of_end).zip(is_free).filter(|(_, is_free)| **is_free) {
             *g += c;
         }
-        solve_one(tangent, g).then_some(share)
+        solve_one(tangents, g).then_some(())?;
+        self.add_by_contact(g, q.as_slice(), &mut share);
+        Some(share)
+    }
+
+    /// Adds what z and q say contact by contact: of friction, and of what normals and weights depend on.
+    fn add_by_contact(&self, z: &[Vec3], q: &[f64], share: &mut ContactShare) {
+        let mut first = 0;
+        for (contact, of_force) in &self.contacts {
+            let own = first..first + contact.dimension();
+            first = own.end;
+            let of_friction =
+                self.rows[own.clone()].iter().zip(&q[own.clone()]).map(|(row, q)| q * row.of_friction);
+            share.of_friction.push((contact.body, contact.partner, of_friction.sum()));
+            if let Some(geometry) = &contact.geometry {
+                let by = (&mut share.of_start[..], &mut share.of_targets[..]);
+                geometry.add_by_start(contact, (z, &q[own]), of_force, by);
+            }
+        }
     }
 }
 
-fn solve_one(tangent: &mut Tangent, g: &mut [Vec3]) -> bool {
+fn solve_one(tangents: &mut Tangents<'_>, g: &mut [Vec3]) -> bool {
     let mut column: Vec<f64> = g.iter().flat_map(|v| [v.x, v.y, v.z]).collect();
-    let is_solved = tangent.solve(&mut column);
+    let is_solved = tangents.solve(&mut column);
     g.iter_mut().zip(column.chunks_exact(3)).for_each(|(g, v)| *g = Vec3::new(v[0], v[1], v[2]));
     is_solved
 }

@@ -1,6 +1,6 @@
 //! What a loss depends on: its derivatives with respect to what was recorded.
 
-use crate::body::DeformableCableHandle;
+use crate::body::{DeformableBodyHandle, DeformableCableHandle};
 use crate::coupling::packed;
 use crate::error::BodyError;
 use crate::fem::DeformableModel;
@@ -9,9 +9,12 @@ use rapier3d::geometry::ColliderHandle;
 use std::sync::Arc;
 
 /// The derivatives of a loss with respect to what a tape has recorded, added one by one. Made by
-/// [`DeformableTape::loss`](crate::DeformableTape::loss).
+/// [`DeformableTape::loss`](crate::DeformableTape::loss), and of a tape of several bodies [`DeformableTape::losses`](crate::DeformableTape::losses).
 #[derive(Clone, Debug)]
 pub struct DeformableLoss {
+    /// The bodies of the tape, and the place among them of the one that it is of.
+    bodies: Arc<[DeformableBodyHandle]>,
+    pub(super) place: usize,
     model: Arc<DeformableModel>,
     pub(super) seeds: Vec<Seed>,
 }
@@ -24,13 +27,42 @@ pub(super) struct Seed {
     pub velocities: Vec<(usize, Vec3)>,
     /// Of the forces of colliders.
     pub contact_forces: Vec<(u64, Vec3)>,
+    /// Of those of other bodies, by their places.
+    pub body_forces: Vec<(usize, Vec3)>,
     /// Of the tensions of cables.
     pub tensions: Vec<(DeformableCableHandle, f64)>,
 }
 
+impl Seed {
+    /// Of the force of a collider on the body.
+    pub fn of_collider(&self, collider: u64) -> Vec3 {
+        self.contact_forces
+            .iter()
+            .filter(|(own, _)| *own == collider)
+            .map(|(_, derivative)| *derivative)
+            .sum()
+    }
+
+    /// Of the force of another body of the tape on the body.
+    pub fn of_body(&self, place: usize) -> Vec3 {
+        self.body_forces.iter().filter(|(own, _)| *own == place).map(|(_, derivative)| *derivative).sum()
+    }
+}
+
 impl DeformableLoss {
-    pub(super) fn new(model: Arc<DeformableModel>, steps: usize) -> Self {
-        Self { model, seeds: vec![Seed::default(); steps] }
+    /// Of the body at a place of a tape's bodies.
+    pub(super) fn new(
+        bodies: Arc<[DeformableBodyHandle]>,
+        place: usize,
+        model: Arc<DeformableModel>,
+        steps: usize,
+    ) -> Self {
+        Self { bodies, place, model, seeds: vec![Seed::default(); steps] }
+    }
+
+    /// The body that it is of.
+    pub fn body(&self) -> DeformableBodyHandle {
+        self.bodies[self.place]
     }
 
     /// Adds the derivative with respect to the position of a vertex at the end of a step, per metre.
@@ -75,6 +107,24 @@ impl DeformableLoss {
         derivative: [f64; 3],
     ) -> Result<(), BodyError> {
         self.seed(step)?.contact_forces.push((packed(collider.into_raw_parts()), derivative.into()));
+        Ok(())
+    }
+
+    /// Adds the derivative with respect to the force of another body of the tape on the body in a step
+    /// ([`DeformableTape::body_force`](crate::DeformableTape::body_force)), per newton.
+    ///
+    /// # Errors
+    /// [`BodyError::NoGradient`] if the tape has no such step, or is not of that body too.
+    pub fn add_body_force(
+        &mut self,
+        step: usize,
+        other: DeformableBodyHandle,
+        derivative: [f64; 3],
+    ) -> Result<(), BodyError> {
+        let place = self.bodies.iter().position(|body| *body == other).filter(|place| *place != self.place);
+        let what = "the force that the loss is of is not one of another body of the tape";
+        let place = place.ok_or(BodyError::NoGradient { step, what })?;
+        self.seed(step)?.body_forces.push((place, derivative.into()));
         Ok(())
     }
 

@@ -4,20 +4,25 @@
 
 mod cables;
 mod checkpoint;
+mod contact_record;
 mod contact_rows;
 mod directions;
 mod filled_rooms;
 mod gradient;
 mod held_twists;
+mod joint_solve;
 mod loss;
+mod pair_geometry;
 mod parameters;
 mod record;
 mod spin;
 mod tangent;
+mod tangents;
 
 mod backward;
 
 mod tape;
+mod way_back;
 mod wind;
 
 pub use gradient::{

@@ -3,7 +3,7 @@
 //! regions meet: there they are of the fourth order. Those of Poisson's ratio are small.
 
 use super::gradient::{MaterialGradient, WovenGradient};
-use super::record::StepRecord;
+use super::record::BodyRecord;
 use crate::fem::elastic_forces::{Evaluation, add_forces};
 use crate::fem::{DeformableModel, Elements, StiffnessDamping};
 use crate::material::{DeformableMaterial, OrthotropicSheet};
@@ -24,7 +24,7 @@ const FORWARD: &[(f64, f64)] =
 /// Virtual work of the elastic forces of a step along z, by materials and activation.
 pub(super) struct ElasticWork<'a> {
     pub model: &'a DeformableModel,
-    pub record: &'a StepRecord,
+    pub record: &'a BodyRecord,
     pub z: &'a [Vec3],
     /// What resists in the step.
     pub damping: &'a StiffnessDamping,
@@ -168,7 +168,7 @@ impl ElasticWork<'_> {
 
     /// Adds what held rods say, in closed form: K goes with E and with 1/(1 + ν), by the share that a region has of a rod's compliance.
     pub fn add_twists(&self, out: &mut [MaterialGradient]) {
-        let StepRecord { materials, x_end, twists, .. } = self.record;
+        let BodyRecord { materials, x_end, twists, .. } = self.record;
         for twist in twists {
             // Virtual work of its forces along z [J].
             let work = twist.of_roll(self.model, materials, x_end, self.z) * twist.twist;
@@ -211,7 +211,7 @@ impl Inertia {
     pub fn add_materials(
         &self,
         model: &DeformableModel,
-        record: &StepRecord,
+        record: &BodyRecord,
         (of_masses, of_damping): (&[f64], f64),
         out: &mut [MaterialGradient],
     ) {

@@ -1,16 +1,19 @@
-//! What is kept of a step so that it can be gone through backward, and which steps cannot be.
+//! What is kept of a step so that it can be gone through backward, and which steps cannot be. Of contacts see `contact_record.rs`.
 
-use super::cables::CableRecord;
+use super::cables::{CableRecord, cables_of};
+use super::contact_record::{ContactRecord, TapeBody, carries};
 use super::held_twists::TwistRecord;
 use super::wind::WindRecord;
-use crate::body::{ConstraintKey, DeformableBody, DeformableWind, HeldTwist, Integrator, Solver};
-use crate::contact::{Endpoint, Law};
+use crate::body::{DeformableBody, DeformableBodyHandle, DeformableWind, HeldTwist, Integrator, Solver};
 use crate::energy::CavityFilling;
-use crate::fem::{Dampers, DeformableModel, Elements, StiffnessDamping};
+use crate::fem::{DampedStep, Dampers, DeformableModel, Elements, StiffnessDamping};
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
-use crate::pipeline::{SolvedBody, SolvedContact};
+use crate::pipeline::{DeformableWorld, SolvedBody, SolvedContact};
 use rapier3d::dynamics::RigidBodyType;
+use rapier3d::pipeline::PhysicsWorld;
+use std::ops::Range;
+use std::sync::Arc;
 
 /// Residual over the forces, and error of contact forces over the largest of them, up to which a step counts as solved: what is
 /// left of it is an error of the gradient.
@@ -18,17 +21,22 @@ const SOLVED: f64 = 1.0e-6;
 /// Distance of a contact that carries from where it is to end, over the mean edge, up to which it counts as solved: what the
 /// iteration of the shifts has left.
 const SETTLED: f64 = 1.0e-6;
-/// Part of the limit of friction from which on a contact slides.
-const SLIDES: f64 = 1.0 - 1.0e-6;
 /// Turn \[rad\] in a step of which the loss is seen, if it is given back.
 const TURNS: f64 = 0.1;
 
 /// Vectors at nodes; one may be there several times.
 pub(super) type NodeVectors = Vec<(usize, Vec3)>;
 
-/// A step of one body.
+/// A step of the bodies of a tape.
 #[derive(Clone, Debug)]
 pub(super) struct StepRecord {
+    pub bodies: Vec<BodyRecord>,
+    pub contacts: Vec<ContactRecord>,
+}
+
+/// A step of one body.
+#[derive(Clone, Debug)]
+pub(super) struct BodyRecord {
     pub h: f64,
     /// Nodes that were led along.
     pub pins: Vec<u32>,
@@ -49,30 +57,12 @@ pub(super) struct StepRecord {
     /// On the nodes \[N\], those of the wind too; empty while there are none.
     pub forces: Vec<Vec3>,
     pub wind: Option<WindRecord>,
-    pub contacts: Vec<ContactRecord>,
     pub cables: Vec<CableRecord>,
     /// What the step has lost of the angular momentum was given back.
     pub keeps_spin: bool,
 }
 
-/// A contact that carried.
-#[derive(Clone, Debug)]
-pub(super) struct ContactRecord {
-    pub collider: u64,
-    pub nodes: [u32; 3],
-    pub weights: [f64; 3],
-    /// Normal and two tangents.
-    pub frame: [Vec3; 3],
-    /// On the body \[N\].
-    pub force: Vec3,
-    pub friction: f64,
-    /// Of the body along the surface \[m\], where it slid.
-    pub slip: Option<Vec3>,
-    /// An overlap that was not to be recovered altogether: where the node ends depends on where it began.
-    pub recovers: bool,
-}
-
-impl StepRecord {
+impl BodyRecord {
     /// Of the last step of a body, under this gravity [m/s²], in which these cables ran through it.
     ///
     /// # Errors
@@ -85,8 +75,6 @@ impl StepRecord {
     ) -> Result<Self, &'static str> {
         check_body(body)?;
         let problem = solved.problem;
-        let contacts = solved.contacts.iter().filter(carries).map(ContactRecord::new);
-        let contacts = contacts.collect::<Result<_, _>>()?;
         check_step(body, solved)?;
         let turn = Vec3::from(body.angvel()).norm() * problem.h();
         let is_mean = (0..body.state.v.len()).all(|n| body.state.v[n] == problem.mean_velocity(n));
@@ -114,7 +102,6 @@ impl StepRecord {
             gravity_scale: body.gravity_scale(),
             forces: forces(body, wind.as_ref(), problem.h()),
             wind,
-            contacts,
             cables,
             keeps_spin,
         })
@@ -122,6 +109,69 @@ impl StepRecord {
 }
 
 impl StepRecord {
+    /// Of the last step of these bodies, under this gravity [m/s²].
+    ///
+    /// # Errors
+    /// Why there is no gradient.
+    pub fn new(
+        (handles, models): (&[DeformableBodyHandle], &[Arc<DeformableModel>]),
+        (physics, deformables): (&PhysicsWorld, &DeformableWorld),
+        gravity: Vec3,
+    ) -> Result<Self, &'static str> {
+        let mut bodies = Vec::with_capacity(handles.len());
+        let mut solved = Vec::with_capacity(handles.len());
+        for handle in handles {
+            let own = deformables.pipeline.solved(*handle).filter(|_| !deformables.counters().skipped);
+            let own = own.ok_or("the body was not stepped: it sleeps or is not enabled")?;
+            let cables = cables_of(*handle, (&deformables.bodies, physics), &own)?;
+            bodies.push(BodyRecord::new(&deformables.bodies[*handle], &own, cables, gravity)?);
+            solved.push(own);
+        }
+        let mut record = Self { bodies, contacts: Vec::new() };
+        let places = record.nodes();
+        let tape_body = |place: usize| TapeBody {
+            handle: handles[place],
+            model: &models[place],
+            first_node: places[place].start,
+            x_start: &record.bodies[place].x_start,
+            targets: &solved[place].problem.target,
+            x_end: &record.bodies[place].x_end,
+        };
+        let tape_bodies: Vec<_> = (0..handles.len()).map(tape_body).collect();
+        let mut contacts = Vec::new();
+        for (place, own) in solved.iter().enumerate() {
+            for contact in own.contacts.iter().filter(carries) {
+                contacts.extend(ContactRecord::new(contact, place, &tape_bodies)?);
+            }
+        }
+        record.contacts = contacts;
+        Ok(record)
+    }
+
+    /// Of each body its nodes among those of all.
+    pub fn nodes(&self) -> Vec<Range<usize>> {
+        let mut first = 0;
+        let of_body = |body: &BodyRecord| {
+            let nodes = first..first + body.x_end.len();
+            first = nodes.end;
+            nodes
+        };
+        self.bodies.iter().map(of_body).collect()
+    }
+}
+
+impl BodyRecord {
+    /// The elements of its model, as they were.
+    pub fn elements<'a>(&'a self, model: &'a DeformableModel) -> Elements<'a> {
+        Elements { model, materials: &self.materials, activations: &self.activations }
+    }
+
+    /// The step as its damping sees it.
+    pub fn damped<'a>(&'a self, elements: &'a Elements<'a>, damping: &'a StiffnessDamping) -> DampedStep<'a> {
+        let (x_start, x_end) = (&self.x_start[..], &self.x_end[..]);
+        DampedStep { elements, damping, h: self.h, x_start, x_end }
+    }
+
     /// What resists in the step, of its materials or others.
     pub fn damping(&self, model: &DeformableModel, materials: &[DeformableMaterial]) -> StiffnessDamping {
         let mut damping = StiffnessDamping::default();
@@ -130,11 +180,6 @@ impl StepRecord {
         damping.begin(&elements, self.h, &self.x_start, None);
         damping
     }
-}
-
-/// Whether a constraint other than one of a cable has a force.
-fn carries(contact: &&SolvedContact<'_>) -> bool {
-    contact.force != Vec3::zeros() && !matches!(contact.constraint.key, ConstraintKey::Cable(_))
 }
 
 fn twist_record(held: &HeldTwist) -> TwistRecord {
@@ -187,58 +232,8 @@ fn check_step(body: &DeformableBody, solved: &SolvedBody<'_>) -> Result<(), &'st
     why.iter().find(|(is_so, _)| *is_so).map_or(Ok(()), |(_, what)| Err(*what))
 }
 
-impl ContactRecord {
-    fn new(contact: &SolvedContact<'_>) -> Result<Self, &'static str> {
-        let constraint = contact.constraint;
-        let ConstraintKey::Obstacle(key) = constraint.key else {
-            return Err("contacts with deformable bodies, and attachments that yield, have none");
-        };
-        let (Law::Contact { friction }, Endpoint::Soft { nodes, weights, .. }, true) =
-            (constraint.law, &constraint.endpoints[0], contact.is_on_prescribed)
-        else {
-            return Err("contacts with rigid bodies that yield have none");
-        };
-        if constraint.compliance != 0.0 || constraint.restitution != 0.0 {
-            return Err("contacts that give way, and restitution, have none");
-        }
-        let [normal, ..] = constraint.frame;
-        let along = |v: &Vec3| v - normal * normal.dot(v);
-        let (pressed, rubbed, slip) =
-            (normal.dot(&contact.force), along(&contact.force).norm(), along(&contact.motion));
-        let slides = friction > 0.0 && rubbed >= SLIDES * friction * pressed && slip != Vec3::zeros();
-        Ok(Self {
-            collider: key.collider,
-            nodes: *nodes,
-            weights: *weights,
-            frame: constraint.frame,
-            force: contact.force,
-            friction,
-            slip: slides.then_some(slip),
-            recovers: constraint.target_gap != constraint.gap,
-        })
-    }
-
-    /// Number of its rows.
-    pub fn dimension(&self) -> usize {
-        if self.friction > 0.0 { 3 } else { 1 }
-    }
-
-    /// The one node that it acts on, if it sticks.
-    pub fn stuck_node(&self) -> Option<usize> {
-        let mut nodes = self.weighted_nodes();
-        let (node, _) = nodes.next()?;
-        (self.friction > 0.0 && self.slip.is_none() && nodes.next().is_none()).then_some(node)
-    }
-
-    /// The nodes that it acts on, with their weights.
-    pub fn weighted_nodes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let pairs = self.nodes.iter().zip(self.weights).filter(|(_, weight)| *weight != 0.0);
-        pairs.map(|(node, weight)| (*node as usize, weight))
-    }
-}
-
 #[cfg(test)]
-impl StepRecord {
+impl BodyRecord {
     /// Of a body of one material that nothing but its elements acts on.
     pub fn still(x: &[Vec3], elements: &crate::fem::Elements<'_>, h: f64) -> Self {
         Self {
@@ -256,7 +251,6 @@ impl StepRecord {
             gravity_scale: 1.0,
             forces: Vec::new(),
             wind: None,
-            contacts: Vec::new(),
             cables: Vec::new(),
             keeps_spin: false,
         }

@@ -2,7 +2,7 @@
 //! `I ω = (L₀ + h Σ m r × a)/(1 + αh) − Σ m r × v̄`, a the acceleration by external forces and L₀ the momentum at the start.
 
 use super::parameters::Inertia;
-use super::record::StepRecord;
+use super::record::BodyRecord;
 use crate::math::{Vec3, centre_of_mass, inertia_about, solve_semidefinite};
 
 /// Derivatives of a loss with respect to all that a step depends on, but for its material.
@@ -38,7 +38,7 @@ impl Cotangents {
 }
 
 /// Goes through it backward: what is with respect to `v′` becomes that with respect to `v̄`.
-pub(super) fn through_spin(record: &StepRecord, inertia: &Inertia, of: &mut Cotangents) {
+pub(super) fn through_spin(record: &BodyRecord, inertia: &Inertia, of: &mut Cotangents) {
     let (h, masses) = (record.h, &inertia.masses);
     let drag = 1.0 + inertia.damping * h;
     let (mass, centre) = centre_of_mass(&record.x_end, masses);

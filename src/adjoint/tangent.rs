@@ -3,7 +3,7 @@
 
 use super::directions::Directions;
 use super::filled_rooms::{FilledRoom, filled_rooms};
-use super::record::StepRecord;
+use super::record::BodyRecord;
 use crate::fem::{DeformableModel, Elements, StiffnessDamping, SystemMatrix, add_damping_tangents};
 use crate::material::DeformableMaterial;
 use crate::math::{Mat3, Vec3};
@@ -42,11 +42,11 @@ impl Tangent {
     pub fn update(
         &mut self,
         model: &DeformableModel,
-        record: &StepRecord,
+        record: &BodyRecord,
         damping: &StiffnessDamping,
         pins: &[u32],
     ) -> bool {
-        let StepRecord { h, x_end: x, materials, activations, twists, .. } = record;
+        let BodyRecord { h, x_end: x, materials, activations, twists, .. } = record;
         let (h, elements) = (*h, Elements { model, materials, activations });
         self.beside.clear();
         self.pins.clear();
@@ -221,7 +221,7 @@ mod tests {
             // Squeezed along its length it would buckle.
             let x: Vec<Vec3> = model.rest.iter().map(|X| Vec3::new(X.x * squeeze, X.y, X.z)).collect();
             let mut tangent = Tangent::new(&model).unwrap();
-            let record = StepRecord::still(&x, &elements, 1.0);
+            let record = BodyRecord::still(&x, &elements, 1.0);
             assert!(tangent.update(&model, &record, &StiffnessDamping::default(), &pins));
             assert_eq!(tangent.values.is_none(), is_definite);
             let symbolic = &tangent.symbolic;

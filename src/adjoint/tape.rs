@@ -1,12 +1,10 @@
-//! Steps as they are recorded, and the way back.
+//! Steps as they are recorded. The way back over them is in `way_back.rs`.
 
-use super::backward::Backward;
-use super::cables::cables_of;
 use super::checkpoint::Checkpoint;
-use super::gradient::{DeformableGradient, MaterialGradient};
+use super::contact_record::Partner;
 use super::loss::DeformableLoss;
 use super::record::StepRecord;
-use crate::body::{DeformableBody, DeformableBodyHandle};
+use crate::body::DeformableBodyHandle;
 use crate::coupling::packed;
 use crate::error::{BodyError, DeformableBodyError};
 use crate::fem::DeformableModel;
@@ -16,10 +14,6 @@ use rapier3d::geometry::ColliderHandle;
 use rapier3d::pipeline::PhysicsWorld;
 use std::fmt;
 use std::sync::Arc;
-
-/// Mean edges by which a replay may end elsewhere: what is left of recorded steps, where these have not the same bits. Other steps are off by
-/// their motion.
-const ELSEWHERE: f64 = 1.0e-6;
 
 /// Steps of one body, recorded so that derivatives of a loss with respect to what the body is made of, how it began and what acted on it
 /// can be had: exact ones of the converged steps, for one solve a step. What its user changes between steps (forces, pins, wind,
@@ -67,14 +61,14 @@ const ELSEWHERE: f64 = 1.0e-6;
 /// ```
 #[derive(Clone)]
 pub struct DeformableTape {
-    handle: DeformableBodyHandle,
-    model: Arc<DeformableModel>,
+    pub(super) bodies: Arc<[DeformableBodyHandle]>,
+    pub(super) models: Vec<Arc<DeformableModel>>,
     /// Those that are kept: all, or with checkpoints those since the last one.
-    steps: Vec<StepRecord>,
+    pub(super) steps: Vec<StepRecord>,
     /// Steps that are not kept.
-    forgotten: usize,
+    pub(super) forgotten: usize,
     checkpoint_every: Option<usize>,
-    checkpoints: Vec<Checkpoint>,
+    pub(super) checkpoints: Vec<Checkpoint>,
     /// The last step has no gradient, and is not recorded: none is replayed through it.
     is_interrupted: bool,
 }
@@ -95,16 +89,40 @@ impl DeformableTape {
         deformables: &DeformableWorld,
         body: DeformableBodyHandle,
     ) -> Result<Self, DeformableBodyError> {
-        let model = deformables.bodies.get(body).ok_or_else(|| body.no_such_body())?.model().clone();
+        Self::of_bodies(deformables, &[body])
+    }
+
+    /// An empty tape of several bodies, which may touch one another. Losses and gradients are lists in their order
+    /// ([`DeformableTape::losses`], [`DeformableTape::backward_all`]).
+    ///
+    /// # Errors
+    /// [`HandleError::NoSuchBody`](crate::HandleError::NoSuchBody); [`BodyError::NoGradient`] if none is named, or one twice.
+    pub fn of_bodies(
+        deformables: &DeformableWorld,
+        bodies: &[DeformableBodyHandle],
+    ) -> Result<Self, DeformableBodyError> {
+        let is_repeated = bodies.iter().enumerate().any(|(k, body)| bodies[..k].contains(body));
+        if bodies.is_empty() || is_repeated {
+            let what = if is_repeated { "the tape names a body twice" } else { "the tape names no body" };
+            return Err(BodyError::NoGradient { step: 0, what }.into());
+        }
+        let model = |body: &DeformableBodyHandle| {
+            Ok(deformables.bodies.get(*body).ok_or_else(|| body.no_such_body())?.model().clone())
+        };
         Ok(Self {
-            handle: body,
-            model,
+            bodies: bodies.into(),
+            models: bodies.iter().map(model).collect::<Result<_, DeformableBodyError>>()?,
             steps: Vec::new(),
             forgotten: 0,
             checkpoint_every: None,
             checkpoints: Vec::new(),
             is_interrupted: false,
         })
+    }
+
+    /// The bodies, in the order in which they were named.
+    pub fn bodies(&self) -> &[DeformableBodyHandle] {
+        &self.bodies
     }
 
     /// Keeps both worlds every so many steps, at least one, and the steps since: memory for `n/every` worlds and `every` steps in
@@ -140,7 +158,7 @@ impl DeformableTape {
     ) -> Result<(), DeformableBodyError> {
         let step = self.len();
         if self.checkpoint_every.is_some_and(|every| self.is_interrupted || step.is_multiple_of(every)) {
-            let checkpoint = Checkpoint::new(step, self.led_to(step), physics, deformables);
+            let checkpoint = Checkpoint::new(step, &self.led_to(step), physics, deformables);
             self.checkpoints.pop_if(|last| last.step == step);
             self.forgotten = step;
             self.steps.clear();
@@ -153,12 +171,12 @@ impl DeformableTape {
         added
     }
 
-    /// Where the step before one has left the body: of steps that are kept, or that a checkpoint comes after.
-    fn led_to(&self, step: usize) -> &[Vec3] {
+    /// Where the step before one has left the bodies: of steps that are kept, or that a checkpoint comes after.
+    pub(super) fn led_to(&self, step: usize) -> Vec<Vec3> {
         let kept = step.checked_sub(self.forgotten + 1).and_then(|place| self.steps.get(place));
         let checkpoint = || self.checkpoints.iter().find(|checkpoint| checkpoint.step == step);
-        kept.map(|record| &record.x_end[..])
-            .or_else(|| checkpoint().map(|checkpoint| &checkpoint.led_to[..]))
+        kept.map(|record| record.bodies.iter().flat_map(|body| body.x_end.iter().copied()).collect())
+            .or_else(|| checkpoint().map(|checkpoint| checkpoint.led_to.clone()))
             .unwrap_or_default()
     }
 
@@ -184,19 +202,13 @@ impl DeformableTape {
         deformables: &DeformableWorld,
         gravity: Vec3,
     ) -> Result<(), DeformableBodyError> {
-        let body = self.body(deformables)?;
         let step = self.len();
-        let solved = deformables.pipeline.solved(self.handle).filter(|_| !deformables.counters().skipped);
-        let what = "the body was not stepped: it sleeps or is not enabled";
-        let solved = solved.ok_or(BodyError::NoGradient { step, what })?;
-        let cables = cables_of(self.handle, (&deformables.bodies, physics), &solved);
-        let record = cables.and_then(|cables| StepRecord::new(body, &solved, cables, gravity));
+        for body in self.bodies.iter() {
+            deformables.bodies.get(*body).ok_or_else(|| body.no_such_body())?;
+        }
+        let record = StepRecord::new((&self.bodies, &self.models), (physics, deformables), gravity);
         self.steps.push(record.map_err(|what| BodyError::NoGradient { step, what })?);
         Ok(())
-    }
-
-    fn body<'a>(&self, deformables: &'a DeformableWorld) -> Result<&'a DeformableBody, DeformableBodyError> {
-        Ok(deformables.bodies.get(self.handle).ok_or_else(|| self.handle.no_such_body())?)
     }
 
     /// Number of steps.
@@ -222,128 +234,58 @@ impl DeformableTape {
         self.forgotten
     }
 
-    /// Force \[N\] of a collider on the body in a step, in the solver's precision; zero of steps that are not kept.
+    /// Force \[N\] of a collider on the body in a step, of several bodies on the first one, in the solver's precision; zero of steps that are
+    /// not kept.
     pub fn contact_force(&self, step: usize, collider: ColliderHandle) -> [f64; 3] {
-        let key = packed(collider.into_raw_parts());
-        let place = step.checked_sub(self.forgotten);
-        let contacts =
-            place.and_then(|place| self.steps.get(place)).into_iter().flat_map(|step| &step.contacts);
-        contacts.filter(|c| c.collider == key).map(|c| c.force).sum::<Vec3>().into()
+        self.contact_force_on(step, self.bodies[0], collider)
     }
 
-    /// A loss of what was recorded so far, which depends on nothing yet.
+    /// Force \[N\] of a collider on a body of the tape in a step, as [`DeformableTape::contact_force`].
+    pub fn contact_force_on(
+        &self,
+        step: usize,
+        body: DeformableBodyHandle,
+        collider: ColliderHandle,
+    ) -> [f64; 3] {
+        let key = Partner::Collider(packed(collider.into_raw_parts()));
+        let Some(body) = self.place(body) else { return [0.0; 3] };
+        self.force_between(step, body, key).into()
+    }
+
+    /// Force \[N\] of another body of the tape on one of it in a step, as [`DeformableTape::contact_force`].
+    pub fn body_force(
+        &self,
+        step: usize,
+        body: DeformableBodyHandle,
+        other: DeformableBodyHandle,
+    ) -> [f64; 3] {
+        let (Some(body), Some(other)) = (self.place(body), self.place(other)) else { return [0.0; 3] };
+        // A body's forces on itself sum to none.
+        let force = |a, b| self.force_between(step, a, Partner::Body(b));
+        (force(body, other) - force(other, body)).into()
+    }
+
+    fn force_between(&self, step: usize, body: usize, partner: Partner) -> Vec3 {
+        let kept = step.checked_sub(self.forgotten).and_then(|place| self.steps.get(place));
+        let contacts = kept.into_iter().flat_map(|step| &step.contacts);
+        contacts.filter(|c| c.body == body && c.partner == partner).map(|c| c.force).sum()
+    }
+
+    fn place(&self, body: DeformableBodyHandle) -> Option<usize> {
+        self.bodies.iter().position(|own| *own == body)
+    }
+
+    /// A loss of what was recorded so far, which depends on nothing yet; of several bodies that of the first one.
     pub fn loss(&self) -> DeformableLoss {
-        DeformableLoss::new(self.model.clone(), self.len())
+        self.loss_at(0)
     }
 
-    /// The derivatives of a loss.
-    ///
-    /// # Errors
-    /// [`BodyError::NoGradient`] for a step that cannot be solved backward, if the loss is of another tape, or if the tape has
-    /// checkpoints.
-    pub fn backward(&self, loss: &DeformableLoss) -> Result<DeformableGradient, BodyError> {
-        if self.forgotten > 0 {
-            let what = "it is not kept: with checkpoints a tape is replayed";
-            return Err(BodyError::NoGradient { step: 0, what });
-        }
-        let mut gradient = self.begin(loss)?;
-        let mut back = self.back()?;
-        self.go_back(0, loss, &mut back, &mut gradient)?;
-        Ok(self.finish(&back, gradient))
+    /// As [`DeformableTape::loss`], of each body: a loss of several is their sum.
+    pub fn losses(&self) -> Vec<DeformableLoss> {
+        (0..self.bodies.len()).map(|place| self.loss_at(place)).collect()
     }
 
-    /// As [`DeformableTape::backward`], from checkpoints: the steps between them are taken again, on copies of the worlds.
-    /// `control` has to do before each step, of which it is told the number, what was done then.
-    ///
-    /// # Errors
-    /// As [`DeformableTape::backward`], and if the steps lead elsewhere than they did.
-    pub fn replay(
-        &self,
-        loss: &DeformableLoss,
-        control: impl FnMut(usize, &mut PhysicsWorld, &mut DeformableWorld),
-    ) -> Result<DeformableGradient, DeformableBodyError> {
-        self.replay_by(loss, control, |physics, deformables| deformables.step(physics))
-    }
-
-    /// As [`DeformableTape::replay`], of steps that `take` takes ([`DeformableTape::step_by`]).
-    ///
-    /// # Errors
-    /// As [`DeformableTape::replay`].
-    pub fn replay_by(
-        &self,
-        loss: &DeformableLoss,
-        mut control: impl FnMut(usize, &mut PhysicsWorld, &mut DeformableWorld),
-        mut take: impl FnMut(&mut PhysicsWorld, &mut DeformableWorld),
-    ) -> Result<DeformableGradient, DeformableBodyError> {
-        let mut gradient = self.begin(loss)?;
-        let mut back = self.back()?;
-        let mut end = self.len();
-        for checkpoint in self.checkpoints.iter().rev() {
-            let (mut physics, mut deformables) = checkpoint.worlds();
-            let mut part = Self::new(&deformables, self.handle)?;
-            for step in checkpoint.step..end {
-                // Before its own step a checkpoint was taken.
-                if step > checkpoint.step {
-                    control(step, &mut physics, &mut deformables);
-                }
-                part.step_by(&mut physics, &mut deformables, &mut take)?;
-            }
-            self.check_replay(end, part.led_to(part.len()))?;
-            part.go_back(checkpoint.step, loss, &mut back, &mut gradient)?;
-            end = checkpoint.step;
-        }
-        Ok(self.finish(&back, gradient))
-    }
-
-    /// Whether a replay has led where the steps before one did.
-    fn check_replay(&self, end: usize, led_to: &[Vec3]) -> Result<(), BodyError> {
-        let far = ELSEWHERE * self.model.surface.mean_edge;
-        let is_there = |(a, b): (&Vec3, &Vec3)| (a - b).amax() <= far;
-        if !self.led_to(end).iter().zip(led_to).all(is_there) {
-            let what = "replayed, it leads elsewhere: `control` does not do what was done, or steps are solved to too little";
-            return Err(BodyError::NoGradient { step: end - 1, what });
-        }
-        Ok(())
-    }
-
-    fn begin(&self, loss: &DeformableLoss) -> Result<DeformableGradient, BodyError> {
-        if loss.seeds.len() != self.len() {
-            let what = "the loss is of another number of steps";
-            return Err(BodyError::NoGradient { step: self.len(), what });
-        }
-        let materials = vec![MaterialGradient::default(); self.model.regions().len()];
-        Ok(DeformableGradient { materials, ..Default::default() })
-    }
-
-    fn back(&self) -> Result<Backward<'_>, BodyError> {
-        let what = "its stiffness has no inverse";
-        Backward::new(&self.model).ok_or(BodyError::NoGradient { step: 0, what })
-    }
-
-    /// Through the steps that are kept, of which the first is that of this number of the loss.
-    fn go_back(
-        &self,
-        first: usize,
-        loss: &DeformableLoss,
-        back: &mut Backward<'_>,
-        gradient: &mut DeformableGradient,
-    ) -> Result<(), BodyError> {
-        for (step, record) in self.steps.iter().enumerate().rev() {
-            let step = first + step;
-            let seed = &loss.seeds[step];
-            seed.positions.iter().for_each(|(node, derivative)| back.x[*node] += derivative);
-            seed.velocities.iter().for_each(|(node, derivative)| back.v[*node] += derivative);
-            let none = |what| BodyError::NoGradient { step, what };
-            back.step(record, seed, gradient).map_err(none)?;
-        }
-        Ok(())
-    }
-
-    fn finish(&self, back: &Backward<'_>, mut gradient: DeformableGradient) -> DeformableGradient {
-        gradient.steps.reverse();
-        let users = |nodes: &[Vec3]| self.model.nodes_by_vertex().map(|n| nodes[n].into()).collect();
-        gradient.initial_positions = users(&back.x);
-        gradient.initial_velocities = users(&back.v);
-        gradient
+    fn loss_at(&self, place: usize) -> DeformableLoss {
+        DeformableLoss::new(self.bodies.clone(), place, self.models[place].clone(), self.len())
     }
 }

@@ -5,7 +5,7 @@
 //! what light nodes take, κ, are differentiated by hand.
 
 use super::gradient::WindGradient;
-use super::record::StepRecord;
+use super::record::BodyRecord;
 use super::spin::Cotangents;
 use crate::body::{DeformableWind, Panel, Push, is_pushed, panels};
 use crate::fem::DeformableModel;
@@ -43,7 +43,7 @@ impl WindRecord {
     pub fn back(
         &self,
         model: &DeformableModel,
-        record: &StepRecord,
+        record: &BodyRecord,
         masses: &[f64],
         of: &mut Cotangents,
     ) -> WindGradient {

@@ -1,6 +1,7 @@
 //! Edges of two surfaces across one another.
 
-use super::soft_surface::{Closing, DEEPEST, STILL_BESIDE, SoftSurface};
+use super::meeting::{self, Closing};
+use super::soft_surface::{DEEPEST, STILL_BESIDE, SoftSurface};
 use crate::math::Vec3;
 
 /// What two edges that cross may miss.
@@ -75,15 +76,10 @@ pub(super) fn crossing(
     if !(height < reach && height > -deepest) {
         return None;
     }
-    let way = mean_motion(a, [i, j]) - mean_motion(b, [k, l]);
-    let closing = Closing::new(height, -normal.dot(&way));
-    // In the plane of both: p + s u = q + t v.
-    let places = |way: Vec3| {
-        let w = q - p - way;
-        [w.cross(&v), w.cross(&u)].map(|side| side.dot(&across) / (length * length))
-    };
+    let x = [a.x[i], a.x[j], b.x[k], b.x[l]];
+    let targets = [a.target[i], a.target[j], b.target[k], b.target[l]];
+    let (closing, [s, t]) = meeting::across(&normal, &x, &targets);
     let inside = |t: f64| t > -tolerance.beside && t < 1.0 + tolerance.beside;
-    let [s, t] = places(way * closing.when);
     // Most edges pass one another beyond their ends: what takes longer comes last.
     let crosses = inside(s)
         && inside(t)
@@ -92,19 +88,15 @@ pub(super) fn crossing(
     let skins = skin(a, [i, j], s) + skin(b, [k, l], t);
     let gap = height - skins;
     // Borders of a sheet that folds are above one another in the plane of both: what comes from the side and is deep at once is not across.
-    let comes_across =
-        gap > -ACROSS * skins || last.is_some() || places(Vec3::zeros()).into_iter().all(inside);
+    let comes_across = gap > -ACROSS * skins
+        || last.is_some()
+        || meeting::places_at(0.0, &x, &targets).into_iter().all(inside);
     (crosses && comes_across).then_some(Crossing { places: [s, t], normal, gap, closing })
 }
 
 /// How far the farther of two nodes may come \[m\].
 fn reach_of(s: &SoftSurface<'_>, ends: [usize; 2]) -> f64 {
     ends.map(|n| s.reach[s.model.surface.index_of_node[n] as usize]).into_iter().fold(0.0, f64::max)
-}
-
-/// Mean motion of two nodes over the step without contact \[m\].
-fn mean_motion(s: &SoftSurface<'_>, ends: [usize; 2]) -> Vec3 {
-    (s.target[ends[0]] - s.x[ends[0]] + s.target[ends[1]] - s.x[ends[1]]) * 0.5
 }
 
 /// Half thickness at a place between two nodes \[m\].

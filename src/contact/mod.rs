@@ -31,6 +31,7 @@ mod surface_tree;
 mod soft_surface;
 
 mod edge_contact;
+mod meeting;
 mod node_contact;
 mod tangle;
 
@@ -49,6 +50,7 @@ pub(crate) use candidates::Candidates;
 pub(crate) use constraint::{Constraint, Endpoint, Law, PathPoint};
 pub(crate) use detection::{Detector, STATIC_MARGIN};
 pub use drag::DeformableDrag;
+pub(crate) use meeting::{Closing, edges_closing, places_at, triangle_closing, weights_at};
 pub(crate) use nearest_facet::{NearestFacet, nearest_weights};
 pub(crate) use obstacle::{Obstacle, ProxyId};
 pub(crate) use pair_scene::Pair;

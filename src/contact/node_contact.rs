@@ -1,7 +1,7 @@
 //! Nodes of one surface on triangles of another.
 
-use super::soft_surface::{Closing, DEEPEST, SoftSurface};
-use super::triangle_contact::barycentric;
+use super::meeting::{self, Closing};
+use super::soft_surface::{DEEPEST, SoftSurface};
 use crate::math::Vec3;
 
 /// Cosine beyond which two surfaces face one another.
@@ -33,8 +33,7 @@ pub(super) fn on_triangle(
 ) -> Option<Touch> {
     let node = own.model.surface.nodes[s] as usize;
     let nodes = other.model.surface.triangles[t].map(|n| n as usize);
-    let corners = nodes.map(|n| other.x[n]);
-    let [a, b, c] = corners;
+    let [a, b, c] = nodes.map(|n| other.x[n]);
     let x = own.x[node];
     let mut normal = other.faces[t];
     if t >= other.model.surface.closed {
@@ -51,14 +50,8 @@ pub(super) fn on_triangle(
     if !(height < reach && height > -DEEPEST * other.model.surface.mean_edge) {
         return None;
     }
-    // Where the two are when they meet.
-    let way = own.target[node] - x;
-    let ways = nodes.map(|n| other.target[n] - other.x[n]);
-    let closing = normal.dot(&((ways[0] + ways[1] + ways[2]) / 3.0 - way));
-    let closing = Closing::new(height, closing);
-    let when = closing.when;
-    let met = [0, 1, 2].map(|k| corners[k] + ways[k] * when);
-    let weights = barycentric(&met, &(x + way * when))?;
+    let targets = [own.target[node], other.target[nodes[0]], other.target[nodes[1]], other.target[nodes[2]]];
+    let (closing, weights) = meeting::on_triangle(&normal, &[x, a, b, c], &targets)?;
     let miss = weights.iter().fold(0.0, |miss: f64, w| miss.max(-w));
     if miss > tolerance {
         return None;

@@ -10,8 +10,9 @@
 
 use super::constraint::{Constraint, Endpoint};
 use super::edge_contact::{CARRYING_EDGES, NEW_EDGES, crossing};
+use super::meeting::Closing;
 use super::node_contact::{Touch, on_triangle};
-use super::soft_surface::{Closing, STILL_BESIDE, SoftPair, SoftSurface, near_in_mesh};
+use super::soft_surface::{STILL_BESIDE, SoftPair, SoftSurface, near_in_mesh};
 use super::tangle::{untangle, untangle_itself};
 use crate::body::{ConstraintKey, ConstraintMemory, SoftPairContact, SoftPairKind};
 use crate::math::Vec3;

@@ -37,22 +37,6 @@ pub(crate) struct SoftPair {
     pub restitution: f64,
 }
 
-/// How a gap closes without contact.
-#[derive(Clone, Copy)]
-pub(super) struct Closing {
-    /// Part of the step: zero if the gap is closed already or opens.
-    pub when: f64,
-    /// \[m\] in the whole step.
-    pub distance: f64,
-}
-
-impl Closing {
-    pub fn new(gap: f64, distance: f64) -> Self {
-        let when = if gap > 0.0 && distance > 0.0 { (gap / distance).min(1.0) } else { 0.0 };
-        Self { when, distance }
-    }
-}
-
 impl SoftPair {
     pub fn constraint(
         &self,

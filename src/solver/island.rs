@@ -64,6 +64,9 @@ const AFTER_SOLVE: Slack = Slack { edges: -1.0e-5, motions: 0.05 };
 /// constant matrix either. With a third and two thirds of the iterations of that it was 9 and 7 %.
 const REDO_ITERATIONS: usize = 10;
 const MOST_REDONE: usize = 100;
+/// Tolerance from which on steps are solved until the shifts of friction have settled too, and iterations that these may take beyond: gradients ask for them.
+const STRICT: f64 = 1.0e-9;
+const SETTLING: usize = 30;
 /// Part of the contacts that may close after a solve and wait for the next iteration of a crowd.
 const FEW_LATE: f64 = 0.01;
 
@@ -97,6 +100,9 @@ impl Island {
 
     fn iterate_until_done(&mut self, context: &SolveContext<'_>) {
         let iterations = self.bodies.iter().map(|b| b.settings.max_iterations).max().unwrap_or(0);
+        let is_strict = self.bodies.iter().any(|b| b.settings.tolerance <= STRICT);
+        let mut settling = if is_strict { SETTLING } else { 0 };
+        self.contacts.is_settling = false;
         for iteration in 1..=iterations {
             self.report.iterations += 1;
             let may_wait = iteration < iterations && self.bodies.len() >= CROWD;
@@ -114,7 +120,11 @@ impl Island {
                 }
             };
             if done {
-                break;
+                if settling == 0 || self.contacts.have_settled(&self.bodies) {
+                    break;
+                }
+                settling -= 1;
+                self.contacts.is_settling = true;
             }
             if !self.contacts.is_empty() {
                 let turned = self.bodies.iter_mut().filter_map(|b| b.refresh_frame().then_some(()));

@@ -25,6 +25,8 @@ pub(crate) struct SolvedContact<'a> {
     pub motion: Vec3,
     /// Endpoint 0 is the body's, and endpoint 1 goes where it is led.
     pub is_on_prescribed: bool,
+    /// The deformable bodies at both endpoints.
+    pub bodies: [Option<DeformableBodyHandle>; 2],
 }
 
 impl StepScratch {
@@ -32,17 +34,22 @@ impl StepScratch {
     pub fn solved(&self, handle: DeformableBodyHandle) -> Option<SolvedBody<'_>> {
         let work = self.islands.iter().find(|work| work.handles.contains(&handle))?;
         let local = work.handles.iter().position(|own| *own == handle)?;
-        let problem = self.idle.get(&handle)?.problem.as_ref()?;
+        let problem = self.problem(handle)?;
         let contacts = &work.island.contacts;
         let acts = |constraint: &Constraint| constraint.all_endpoints().any(|end| end.is_of(local));
         let own = contacts.active.iter().filter(|contact| acts(&contact.constraint));
         let solved = own.map(|contact| {
             let constraint = &contact.constraint;
             let moved = |endpoint: &Endpoint| match endpoint {
-                Endpoint::Soft { .. } if endpoint.is_of(local) => {
-                    endpoint.interpolate(&problem.current.x) - endpoint.interpolate(&problem.x_start)
-                }
+                Endpoint::Soft { body, .. } => match self.problem(work.handles[*body]) {
+                    Some(own) => endpoint.interpolate(&own.current.x) - endpoint.interpolate(&own.x_start),
+                    None => Vec3::zeros(),
+                },
                 _ => self.scene.proxies.displacement(endpoint, &self.reaction_list, problem.dt()),
+            };
+            let body_of = |endpoint: &Endpoint| match endpoint {
+                Endpoint::Soft { body, .. } => Some(work.handles[*body]),
+                Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => None,
             };
             let [body, partner] = &constraint.endpoints;
             let is_led = |proxy| self.scene.proxies.get(proxy).prescribed().is_some();
@@ -51,6 +58,7 @@ impl StepScratch {
                 force: contact.force(&contacts.lambda),
                 motion: constraint.relative(moved) - constraint.surface_motion,
                 is_on_prescribed: body.is_of(local) && partner.proxy().is_some_and(is_led),
+                bodies: [body_of(body), body_of(partner)],
             }
         });
         Some(SolvedBody {
@@ -59,5 +67,9 @@ impl StepScratch {
             in_flight: contacts.active.is_empty(),
             contact_error: work.island.report.contacts.error,
         })
+    }
+
+    fn problem(&self, handle: DeformableBodyHandle) -> Option<&BodyProblem> {
+        self.idle.get(&handle)?.problem.as_ref()
     }
 }

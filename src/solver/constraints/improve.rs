@@ -56,6 +56,9 @@ const NEARLY_SOLVED: f64 = 1.0e-2;
 /// Overlap that sweeps may leave in a small island, in mean edges.
 const OVERLAP_LEFT: f64 = 0.05;
 
+/// Distance from where it is to end, in mean edges, up to which a contact has settled.
+const SETTLED: f64 = 1.0e-10;
+
 /// What a solve is given.
 #[derive(Clone, Copy)]
 pub(super) struct Around<'a> {
@@ -189,6 +192,14 @@ impl ContactSystem {
         self.active.iter().filter(may_open).any(is_deep)
     }
 
+    /// Whether the contacts that carry and rub end where they are to: their shifts have become what their slips ask for.
+    pub fn have_settled(&self, bodies: &[BodyProblem]) -> bool {
+        let rubs = |contact: &&ActiveContact| matches!(contact.constraint.law, Law::Contact { friction } if friction > 0.0);
+        self.active.iter().filter(rubs).filter(|contact| self.lambda[contact.first] > 0.0).all(|contact| {
+            self.gaps[contact.first].abs() <= SETTLED * shorter_edge(&contact.constraint, bodies)
+        })
+    }
+
     /// Takes the motions along the contacts' directions to the bodies' trial positions.
     pub(super) fn measure(&mut self, bodies: &[BodyProblem], context: &SolveContext<'_>) {
         let reactions = self.collect_reactions(context);
@@ -219,13 +230,13 @@ impl ContactSystem {
         }
     }
 
-    /// σ = μ‖slip‖ of contacts that carry, 0 of open ones; so much of it is taken.
+    /// σ = μ‖slip‖ of contacts that carry, 0 of open ones until all is to settle; so much of it is taken.
     pub(super) fn update_shifts(&mut self, blend: f64) {
         for contact in &mut self.active {
             let rows = contact.rows();
             let mut shift = 0.0;
             if let (Law::Contact { friction }, [_, a, b]) = (contact.constraint.law, &self.gaps[rows])
-                && self.lambda[contact.first] > 0.0
+                && (self.lambda[contact.first] > 0.0 || self.is_settling)
             {
                 shift = friction * a.hypot(*b);
             }

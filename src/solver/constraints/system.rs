@@ -42,6 +42,8 @@ pub(crate) struct ContactSystem {
     pub(super) free: FreeSolve,
     pub work: ContactWork,
     pub(super) spent: Spent,
+    /// Open contacts have a shift too: one that slips, and opens by less than that, would take turns with itself otherwise.
+    pub is_settling: bool,
     /// Energy that undoing overlaps may still make, by bodies \[J\].
     pub(super) may_make: Vec<f64>,
 }
