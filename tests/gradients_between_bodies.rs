@@ -223,3 +223,159 @@ fn what_lands_on_another_has_gradients() {
     let errors = errors(&scene, &run(1.0, 0.0, 0.0), &WITHOUT_FRICTION);
     assert!(errors.iter().all(|error| *error < 1e-3), "{errors:?}");
 }
+
+/// A bar with a ridge along x, turned about y by an angle.
+fn ridge(y: f32, turned: f32) -> DeformableBodyBuilder {
+    let bar = DeformableBodyBuilder::cuboid(Vector::new(0.2, 0.1, 0.1), [5, 2, 2]);
+    let turn = Rotation::from_rotation_y(turned) * Rotation::from_rotation_x(std::f32::consts::FRAC_PI_4);
+    bar.pose(Pose::from_parts(Vector::new(0.013, y, 0.007), turn))
+}
+
+#[test]
+fn ridges_across_one_another_have_gradients() {
+    let deep = 0.1 * std::f32::consts::SQRT_2;
+    for (friction, along) in [(1.0, 0.0625), (0.25, 0.5)] {
+        // Before the edge's end comes to the other: contacts say the same twice there.
+        let scene = Scene {
+            pins: |x| x.y < -0.2,
+            steps: 7,
+            look: 6,
+            ..Scene::new(ridge(-deep, 0.0), ridge(deep + 5e-4, 1.3))
+        };
+        let which: &[usize] = if friction < 1.0 { &ALL } else { &WITHOUT_FRICTION };
+        let errors = errors(&scene, &run(friction, along, -0.25), which);
+        assert!(errors.iter().all(|error| *error < 1e-3), "{friction}: {errors:?}");
+    }
+}
+
+#[test]
+fn a_cloth_on_a_block_has_gradients() {
+    let cloth = DeformableBodyBuilder::cloth([0.15, 0.15], [4, 4], 0.01).rotation(Vector::Y * 0.3);
+    let cloth = cloth.translation(Vector::new(0.021, 0.0065, -0.011));
+    let scene = Scene::new(block(0.3, 3, -0.125), cloth);
+    let errors = errors(&scene, &run(0.25, 0.25, -0.5), &ALL);
+    assert!(errors.iter().all(|error| *error < 1e-3), "{errors:?}");
+}
+
+/// Two pads that rise with this speed [m/s] while they close on a ball, with this friction; pads first.
+fn pads_and_ball(rise: f64, friction: f64) -> (DeformableWorld, [DeformableBodyHandle; 3]) {
+    let mut world = DeformableWorld::new();
+    let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-11).max_iterations(400);
+    let settings = settings.contact_tolerance(1e-10).keeps_spin(false);
+    let mut insert = |builder: DeformableBodyBuilder| {
+        let material = DeformableMaterial::new(1.0e5, 0.3).friction(friction);
+        world.insert(builder.material(material).can_sleep(false).settings(settings)).unwrap()
+    };
+    let pad = |side: f32| {
+        let pad = DeformableBodyBuilder::cuboid(Vector::new(0.02, 0.06, 0.06), [1, 3, 3]);
+        let pad = pad.rotation(Vector::X * 0.3).translation(Vector::X * side * 0.0605);
+        pad.pinned(move |x| x.x * side > 0.08)
+    };
+    let ball = DeformableBodyBuilder::filled(&Ball::new(0.04), 0.02);
+    let ball = ball.translation(Vector::new(0.0, 0.003, 0.002));
+    let bodies = [insert(pad(-1.0)), insert(pad(1.0)), insert(ball)];
+    for (pad, inwards) in [(bodies[0], 0.03125), (bodies[1], -0.03125)] {
+        let body = &mut world.bodies[pad];
+        for vertex in body.pinned().collect::<Vec<_>>() {
+            body.set_pin_velocity(vertex, Vector::new(inwards, rise as f32, 0.0)).unwrap();
+        }
+    }
+    (world, bodies)
+}
+
+/// Height \[m\] of a ball that pads lift, and its derivatives with respect to their speed and to the friction.
+fn lift(rise: f64, friction: f64) -> (f64, [f64; 2]) {
+    let (mut world, bodies) = pads_and_ball(rise, friction);
+    let mut physics = PhysicsWorld::new();
+    let mut tape = DeformableTape::of_bodies(&world, &bodies).unwrap();
+    let steps = 12;
+    (0..steps).for_each(|_| tape.step(&mut physics, &mut world).unwrap());
+    let body = &world.bodies[bodies[2]];
+    let (mut losses, count) = (tape.losses(), body.vertex_count());
+    (0..count).for_each(|v| losses[2].add_position(steps - 1, v, [0.0, 1.0 / count as f64, 0.0]).unwrap());
+    let height = (0..count).map(|v| body.position(v).unwrap()[1]).sum::<f64>() / count as f64;
+    let gradients = tape.backward_all(&losses).unwrap();
+    let h = f64::from(physics.integration_parameters.dt);
+    // Pins have gone by (k + 1) h of their velocity at the end of step k.
+    let of_step = |(k, step): (usize, &StepGradient)| {
+        (k + 1) as f64 * h * step.pin_targets.iter().map(|t| t[1]).sum::<f64>()
+    };
+    let of_rise = gradients[..2].iter().flat_map(|pad| pad.steps.iter().enumerate().map(of_step)).sum();
+    (height, [of_rise, gradients.iter().map(|gradient| gradient.friction).sum()])
+}
+
+#[test]
+fn a_ball_that_pads_lift_has_gradients() {
+    let (height, [of_rise, of_friction]) = lift(0.25, 1.0);
+    // It falls by 0.2 m without them.
+    assert!(height > 0.0, "{height}");
+    let (d, e) = (1.0 / 4096.0, 1.0 / 8192.0);
+    let by_rise = (lift(0.25 + d, 1.0).0 - lift(0.25 - d, 1.0).0) / (2.0 * d);
+    let by_friction = (lift(0.25, 1.0 + e).0 - lift(0.25, 1.0 - e).0) / (2.0 * e);
+    println!("{of_rise:.9e} against {by_rise:.9e}, {of_friction:.9e} against {by_friction:.9e}");
+    assert!((of_rise / by_rise - 1.0).abs() < 1e-3, "{of_rise} against {by_rise}");
+    assert!((of_friction / by_friction - 1.0).abs() < 1e-3, "{of_friction} against {by_friction}");
+}
+
+#[test]
+fn what_has_no_gradient_is_refused() {
+    let mut physics = PhysicsWorld::new();
+    let mut world = DeformableWorld::new();
+    let lower =
+        world.insert(block(0.2, 2, -0.125).fidelity(Fidelity::Reference).pinned(|x| x.y < -0.2)).unwrap();
+    let upper = world.insert(upper(0.1255).fidelity(Fidelity::Reference)).unwrap();
+    let twice = DeformableTape::of_bodies(&world, &[lower, upper, lower]).unwrap_err().to_string();
+    assert!(twice.contains("twice"), "{twice}");
+    let none = DeformableTape::of_bodies(&world, &[]).unwrap_err().to_string();
+    assert!(none.contains("no body"), "{none}");
+    let mut alone = DeformableTape::new(&world, upper).unwrap();
+    let mut both = DeformableTape::of_bodies(&world, &[lower, upper]).unwrap();
+    let results: Vec<_> = (0..4)
+        .map(|_| {
+            world.step(&mut physics);
+            both.record(&physics, &world).unwrap();
+            alone.record(&physics, &world)
+        })
+        .collect();
+    let refused = results.into_iter().find_map(Result::err).expect("they touch").to_string();
+    assert!(refused.contains("not on the tape"), "{refused}");
+    let one = both.backward(&both.loss()).unwrap_err().to_string();
+    assert!(one.contains("backward_all"), "{one}");
+    let swapped: Vec<_> = both.losses().into_iter().rev().collect();
+    assert!(both.backward_all(&swapped).unwrap_err().to_string().contains("another body"));
+    let own = both.loss().add_body_force(0, lower, [1.0; 3]).unwrap_err().to_string();
+    assert!(own.contains("another body"), "{own}");
+}
+
+/// From checkpoints the gradients have the same bits, and forces between bodies are equal and opposite.
+#[test]
+fn checkpoints_of_several_bodies_replay_to_the_same_bits() {
+    let gradients = [None, Some(4)].map(|every| {
+        let mut physics = PhysicsWorld::new();
+        let mut world = DeformableWorld::new();
+        let strict = |builder: DeformableBodyBuilder| {
+            builder.fidelity(Fidelity::Reference).can_sleep(false).tune(|s| s.keeps_spin = false)
+        };
+        let lower = world.insert(strict(block(0.2, 2, -0.125)).pinned(|x| x.y < -0.2)).unwrap();
+        let upper = world.insert(strict(upper(0.1255))).unwrap();
+        let mut tape = DeformableTape::of_bodies(&world, &[lower, upper]).unwrap();
+        if let Some(every) = every {
+            tape = tape.checkpoint_every(every);
+        }
+        (0..10).for_each(|_| tape.step(&mut physics, &mut world).unwrap());
+        let mut losses = tape.losses();
+        losses[1].add_position(9, 3, [1.0, 2.0, 3.0]).unwrap();
+        losses[0].add_velocity(5, 7, [0.5, 0.0, 1.0]).unwrap();
+        let force = tape.body_force(9, upper, lower);
+        assert!(force[1] > 0.0);
+        assert_eq!(force.map(|f| -f), tape.body_force(9, lower, upper));
+        match every {
+            None => tape.backward_all(&losses).unwrap(),
+            Some(_) => {
+                let step = |physics: &mut PhysicsWorld, world: &mut DeformableWorld| world.step(physics);
+                tape.replay_all(&losses, |_, _, _| {}, step).unwrap()
+            }
+        }
+    });
+    assert_eq!(gradients[0], gradients[1]);
+}

@@ -67,6 +67,15 @@ fn what_lands_has_gradients() {
     }
 }
 
+/// Contacts that open by less than μ times their slip took turns with themselves: a step ended with one that carried 2 mm off the floor.
+#[test]
+fn what_lands_aslant_has_gradients() {
+    let scene = Scene { stride: 0.125, look: 6, steps: 12, ..on_a_floor(-0.15) };
+    let run = Run { launch: [1.0, -1.5], ..run(0.25, 0.0) };
+    let errors = errors(&scene, &run, true, &["initial position"]);
+    assert!(errors.iter().all(|error| *error < EXACT), "{errors:?}");
+}
+
 /// What the first step of a scene that has no gradient says.
 fn refusal(build: impl Fn(DeformableBodyBuilder) -> DeformableBodyBuilder) -> &'static str {
     let mut physics = PhysicsWorld::new();

@@ -104,7 +104,7 @@ pub struct DeformableGradient {
     pub initial_velocities: Vec<[f64; 3]>,
     /// With respect to the materials of all steps, in the order of [`DeformableModel::regions`](crate::DeformableModel::regions).
     pub materials: Vec<MaterialGradient>,
-    /// Of the coefficients of friction of all contacts together.
+    /// Of the coefficients of friction of all contacts together; of one between two bodies each has half.
     pub friction: f64,
     /// Step by step.
     pub steps: Vec<StepGradient>,

@@ -15,12 +15,12 @@ use rapier3d::pipeline::PhysicsWorld;
 use std::fmt;
 use std::sync::Arc;
 
-/// Steps of one body, recorded so that derivatives of a loss with respect to what the body is made of, how it began and what acted on it
+/// Steps of one body, or of several that touch, recorded so that derivatives of a loss with respect to what the body is made of, how it began and what acted on it
 /// can be had: exact ones of the converged steps, for one solve a step. What its user changes between steps (forces, pins, wind,
 /// activation, impulses, what draws cables) takes part; what moves or speeds vertices up counts as added to what was there.
 ///
 /// Steps have to be solved far: a [`tolerance`](crate::SolverSettings::tolerance) of 1e-10 or less, as that of
-/// [`Fidelity::Reference`](crate::Fidelity::Reference). Contacts are those with colliders that do not yield. What has no gradient is
+/// [`Fidelity::Reference`](crate::Fidelity::Reference). Contacts are those with colliders that do not yield, and between the bodies of the tape. What has no gradient is
 /// refused by [`DeformableTape::record`]; it is listed in `docs/limits.md`.
 ///
 /// How fast has a cube to be thrown so that it is at a target after half a second? Its flight is linear in that: one step of Newton's

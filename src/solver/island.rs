@@ -125,6 +125,7 @@ impl Island {
                 }
                 settling -= 1;
                 self.contacts.is_settling = true;
+                self.contacts.renew_budget();
             }
             if !self.contacts.is_empty() {
                 let turned = self.bodies.iter_mut().filter_map(|b| b.refresh_frame().then_some(()));
