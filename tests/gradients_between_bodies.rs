@@ -343,6 +343,10 @@ fn what_has_no_gradient_is_refused() {
     assert!(one.contains("backward_all"), "{one}");
     let swapped: Vec<_> = both.losses().into_iter().rev().collect();
     assert!(both.backward_all(&swapped).unwrap_err().to_string().contains("another body"));
+    let turned = DeformableTape::of_bodies(&world, &[upper, lower]).unwrap();
+    assert!(
+        DeformableTape::of_bodies(&world, &[lower, upper]).unwrap().backward_all(&turned.losses()).is_err()
+    );
     let own = both.loss().add_body_force(0, lower, [1.0; 3]).unwrap_err().to_string();
     assert!(own.contains("another body"), "{own}");
 }

@@ -13,9 +13,9 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct DeformableLoss {
     /// The bodies of the tape, and the place among them of the one that it is of.
-    bodies: Arc<[DeformableBodyHandle]>,
+    pub(super) bodies: Arc<[DeformableBodyHandle]>,
     pub(super) place: usize,
-    model: Arc<DeformableModel>,
+    pub(super) model: Arc<DeformableModel>,
     pub(super) seeds: Vec<Seed>,
 }
 

@@ -107,6 +107,26 @@ impl PairGeometry {
         if matches!(self.shape, Shape::NodeOnTriangle { is_first: false }) { -1.0 } else { 1.0 }
     }
 
+    /// One of the nodes of the first body, minus one of those of the second: the sign of its weight, if that is not beyond an edge's end.
+    fn side(&self, k: usize) -> f64 {
+        match self.shape {
+            Shape::NodeOnTriangle { .. } => {
+                if k == 0 {
+                    self.towards()
+                } else {
+                    -self.towards()
+                }
+            }
+            Shape::Edges => {
+                if k < 2 {
+                    1.0
+                } else {
+                    -1.0
+                }
+            }
+        }
+    }
+
     /// Weights at a part of the step, those of the second body negative.
     fn weights(&self, when: f64, x: &[Vec3; 4], targets: &[Vec3; 4]) -> Option<[f64; 4]> {
         match self.shape {
@@ -197,11 +217,7 @@ impl PairGeometry {
         let of_normal = said * normal.dot(&force) - rubbed * normal.dot(&said) + apart * q[0]
             - looks * normal.dot(&motion);
         let weights = std::array::from_fn(|k| {
-            let skin = if contact.recovers {
-                0.0
-            } else {
-                self.half_thickness[k] * self.weight(contact, k).signum()
-            };
+            let skin = if contact.recovers { 0.0 } else { self.half_thickness[k] * self.side(k) };
             let moved = self.x_end[k] - self.x_start[k];
             z[self.nodes[k]].dot(&force) + q[0] * (normal.dot(&counts(k)) - skin) + looks.dot(&moved)
         });

@@ -113,10 +113,12 @@ impl DeformableTape {
             let what = "a tape of several bodies has a loss of each: see `losses` and `backward_all`";
             return Err(BodyError::NoGradient { step, what });
         }
-        let is_ours =
-            |(place, loss): (usize, &DeformableLoss)| loss.place == place && loss.seeds.len() == step;
+        let is_ours = |(place, loss): (usize, &DeformableLoss)| {
+            let is_like = loss.model.rest.len() == self.models[place].rest.len();
+            loss.bodies == self.bodies && is_like && loss.place == place && loss.seeds.len() == step
+        };
         if !losses.iter().enumerate().all(is_ours) {
-            let what = "the loss is of another number of steps, or of another body";
+            let what = "the loss is of another tape, another number of steps, or another body";
             return Err(BodyError::NoGradient { step, what });
         }
         let none = |model: &Arc<DeformableModel>| {

@@ -64,7 +64,8 @@ const AFTER_SOLVE: Slack = Slack { edges: -1.0e-5, motions: 0.05 };
 /// constant matrix either. With a third and two thirds of the iterations of that it was 9 and 7 %.
 const REDO_ITERATIONS: usize = 10;
 const MOST_REDONE: usize = 100;
-/// Tolerance from which on steps are solved until the shifts of friction have settled too, and iterations that these may take beyond: gradients ask for them.
+/// Tolerance from which on, if all bodies of an island have it, steps are solved until the shifts of friction have settled too, and iterations that these
+/// may take beyond: gradients ask for them.
 const STRICT: f64 = 1.0e-9;
 const SETTLING: usize = 30;
 /// Part of the contacts that may close after a solve and wait for the next iteration of a crowd.
@@ -100,7 +101,9 @@ impl Island {
 
     fn iterate_until_done(&mut self, context: &SolveContext<'_>) {
         let iterations = self.bodies.iter().map(|b| b.settings.max_iterations).max().unwrap_or(0);
-        let is_strict = self.bodies.iter().any(|b| b.settings.tolerance <= STRICT);
+        // A tolerance of zero asks for all iterations, not for more.
+        let is_strict = |b: &BodyProblem| b.settings.tolerance > 0.0 && b.settings.tolerance <= STRICT;
+        let is_strict = self.bodies.iter().all(is_strict);
         let mut settling = if is_strict { SETTLING } else { 0 };
         self.contacts.is_settling = false;
         for iteration in 1..=iterations {
@@ -134,6 +137,7 @@ impl Island {
                 }
             }
         }
+        self.contacts.is_settling = false;
     }
 
     /// Does steps in contact of the second order that have gained energy again by implicit Euler.
