@@ -1,5 +1,9 @@
 //! Gradients over steps of several deformable bodies that touch one another, against central differences between whole runs.
 
+#[path = "common/differences.rs"]
+mod differences;
+
+use differences::{slopes, weight};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 
@@ -44,10 +48,6 @@ struct Outcome {
     shifted: [usize; 2],
     force: [f64; 3],
     h: f64,
-}
-
-fn weight(k: usize) -> f64 {
-    ((k * 7919 + 13) % 101) as f64 / 50.0 - 1.0
 }
 
 /// The vertex nearest to a place.
@@ -162,13 +162,12 @@ fn errors(scene: &Scene, run: &Run, which: &[usize]) -> [f64; 2] {
         let by = BY[which] * scene.stride;
         let at = |d: f64| {
             let mut changed = *run;
-            changed.values[which] += d * by;
+            changed.values[which] += d;
             let out = scene.run(&changed);
             [out.loss, along(out.force)]
         };
-        let (near, far) = ([at(1.0), at(-1.0)], [at(2.0), at(-2.0)]);
-        for (k, what) in ["state", "force"].into_iter().enumerate() {
-            let slope = (8.0 * (near[0][k] - near[1][k]) - (far[0][k] - far[1][k])) / (12.0 * by);
+        let slopes = slopes(by, at);
+        for (k, (what, slope)) in ["state", "force"].into_iter().zip(slopes).enumerate() {
             let ours = derivative(&out, &gradients[k], which);
             let error = (ours / slope - 1.0).abs();
             println!("  {} of {what}: {ours:.9e} against {slope:.9e}, {error:.1e}", NAMES[which]);

@@ -36,17 +36,17 @@ pub(super) struct Seed {
 impl Seed {
     /// Of the force of a collider on the body.
     pub fn of_collider(&self, collider: u64) -> Vec3 {
-        self.contact_forces
-            .iter()
-            .filter(|(own, _)| *own == collider)
-            .map(|(_, derivative)| *derivative)
-            .sum()
+        sum_of(&self.contact_forces, collider)
     }
 
     /// Of the force of another body of the tape on the body.
     pub fn of_body(&self, place: usize) -> Vec3 {
-        self.body_forces.iter().filter(|(own, _)| *own == place).map(|(_, derivative)| *derivative).sum()
+        sum_of(&self.body_forces, place)
     }
+}
+
+fn sum_of<K: Copy + PartialEq>(derivatives: &[(K, Vec3)], of: K) -> Vec3 {
+    derivatives.iter().filter(|(own, _)| *own == of).map(|(_, derivative)| *derivative).sum()
 }
 
 impl DeformableLoss {

@@ -28,7 +28,7 @@ pub struct DeformableParameters {
     pub neighbourhood_bodies: usize,
     /// Iterations over the contacts of an island in a step: sweeps, or half as many products with the Delassus operator. A
     /// counted number, so that results do not depend on the machine. What it leaves is overlap, which the next steps take
-    /// up from there. Of bodies that all have a `tolerance` of 1e-9 or less, above zero, a step may take it thirty times more, until the shifts
+    /// up from there. Of bodies that all have a `tolerance` of 1e-10 or less, above zero, a step may take it thirty times more, until the shifts
     /// of friction have settled.
     pub contact_iterations: usize,
     /// Memory \[bytes\] for columns of inverses, kept between steps for contacts.

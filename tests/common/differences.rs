@@ -119,7 +119,7 @@ struct Start {
 }
 
 /// Numbers without a pattern.
-fn weight(k: usize) -> f64 {
+pub fn weight(k: usize) -> f64 {
     ((k * 7919 + 13) % 101) as f64 / 50.0 - 1.0
 }
 
@@ -242,6 +242,12 @@ impl Scene {
     }
 }
 
+/// Derivatives of what a change leads to, by differences of the fourth order.
+pub fn slopes<const N: usize>(by: f64, mut at: impl FnMut(f64) -> [f64; N]) -> [f64; N] {
+    let [near, less, far, farther_less] = [1.0, -1.0, 2.0, -2.0].map(|d| at(d * by));
+    std::array::from_fn(|k| (8.0 * (near[k] - less[k]) - (far[k] - farther_less[k])) / (12.0 * by))
+}
+
 /// The largest relative error of the tape's derivatives against differences of the fourth order between whole runs.
 pub fn largest_error<'a>(
     scene: &Scene,
@@ -257,10 +263,10 @@ pub fn largest_error<'a>(
         let by = parameter.by * scene.stride;
         let at = |d: f64| {
             let mut changed = *run;
-            (parameter.change)(&mut changed, d * by);
-            loss(&scene.run(&changed))
+            (parameter.change)(&mut changed, d);
+            [loss(&scene.run(&changed))]
         };
-        let slope = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * by);
+        let [slope] = slopes(by, at);
         let ours = (parameter.of)(&gradient, &out);
         let error = (ours / slope - 1.0).abs();
         println!("  {}: {ours:.9e} against {slope:.9e}, {error:.1e}", parameter.name);

@@ -194,9 +194,9 @@ impl ContactSystem {
 
     /// Whether the contacts that carry and rub end where they are to: their shifts have become what their slips ask for.
     pub fn have_settled(&self, bodies: &[BodyProblem]) -> bool {
-        let rubs = |contact: &&ActiveContact| matches!(contact.constraint.law, Law::Contact { friction } if friction > 0.0);
-        self.active.iter().filter(rubs).filter(|contact| self.lambda[contact.first] > 0.0).all(|contact| {
-            self.gaps[contact.first].abs() <= SETTLED * shorter_edge(&contact.constraint, bodies)
+        self.active.iter().all(|ActiveContact { constraint, first, .. }| {
+            let rubs = constraint.dimension() == 3 && self.lambda[*first] > 0.0;
+            !rubs || self.gaps[*first].abs() <= SETTLED * shorter_edge(constraint, bodies)
         })
     }
 
