@@ -27,7 +27,7 @@
 //! | `touch` | taxels, markers, depth images and wrenches, read after a step |
 //!
 //! # Invariants
-//! - A module imports from modules above it in the table only, within `solver` too (`tests/architecture.rs`).
+//! - A module imports from modules above it in the table only, within `solver` too (`tests/house/architecture.rs`).
 //! - Only `coupling` writes to rapier's sets (`pipeline` passes them on), only `contact` names parry's queries, only
 //!   `solver/linear/factor.rs` names faer.
 //! - State is `f64`; rapier's `f32` types appear at the surface.

@@ -7,7 +7,7 @@
 //! has one island. Error: of paths the root mean square distance from the reference's at the same step and mesh, of
 //! shapes at rest that at the end, both over the largest displacement of the reference. The reference is Newton's
 //! method to 1e-10 up to 1000 tetrahedra, and beyond the default solver to 1e-9, which comes to the same
-//! (`tests/solvers.rs`).
+//! (`tests/solids/solvers.rs`).
 
 #[path = "../shared/clock.rs"]
 mod clock;

@@ -52,7 +52,7 @@ pub(crate) fn prescribed_nodes(
 }
 
 /// Compliance \[m/N\] up to which an attachment leaves a contact of the same node nothing to do. In
-/// `tests/hanging.rs` the two trade force without end at 1e-10, at 1e4 to 1e8 Pa alike, and do not at 1e-9.
+/// `tests/thin/hanging.rs` the two trade force without end at 1e-10, at 1e4 to 1e8 Pa alike, and do not at 1e-9.
 const AS_HARD: f64 = 1.0e-8;
 
 /// Lists the nodes that attachments hold fast to rigid bodies, each with its body and the rigid body's proxy. A spring does

@@ -248,47 +248,78 @@ pub fn slopes<const N: usize>(by: f64, mut at: impl FnMut(f64) -> [f64; N]) -> [
     std::array::from_fn(|k| (8.0 * (near[k] - less[k]) - (far[k] - farther_less[k])) / (12.0 * by))
 }
 
-/// The largest relative error of the tape's derivatives against differences of the fourth order between whole runs.
-pub fn largest_error<'a>(
+/// A loss of what came of a run, its derivatives, and which parameters it feels enough to tell.
+pub struct Sought<'a> {
+    pub loss: &'a dyn Fn(&Outcome) -> f64,
+    pub seeds: &'a dyn Fn(&Outcome) -> DeformableLoss,
+    pub feels: &'a dyn Fn(&Parameter) -> bool,
+}
+
+/// The loss that a run has.
+const OF_STATE: Sought<'static> =
+    Sought { loss: &|out| out.loss, seeds: &|out| out.seeds.clone(), feels: &|_| true };
+
+/// The largest relative errors of the tape's derivatives of some losses against differences of the fourth order between whole runs.
+pub fn largest_errors<'a, const N: usize>(
     scene: &Scene,
     run: &Run,
-    loss: &dyn Fn(&Outcome) -> f64,
-    seeds: &dyn Fn(&Outcome) -> DeformableLoss,
+    sought: [Sought<'_>; N],
     parameters: impl IntoIterator<Item = &'a Parameter>,
-) -> f64 {
+) -> [f64; N] {
     let out = scene.run(run);
-    let gradient = out.tape.backward(&seeds(&out)).unwrap();
-    let mut largest = 0.0_f64;
+    let gradients = sought.each_ref().map(|sought| out.tape.backward(&(sought.seeds)(&out)).unwrap());
+    let mut largest = [0.0_f64; N];
     for parameter in parameters {
-        let by = parameter.by * scene.stride;
         let at = |d: f64| {
             let mut changed = *run;
             (parameter.change)(&mut changed, d);
-            [loss(&scene.run(&changed))]
+            let changed = scene.run(&changed);
+            sought.each_ref().map(|sought| (sought.loss)(&changed))
         };
-        let [slope] = slopes(by, at);
-        let ours = (parameter.of)(&gradient, &out);
-        let error = (ours / slope - 1.0).abs();
-        println!("  {}: {ours:.9e} against {slope:.9e}, {error:.1e}", parameter.name);
-        // NaN must not vanish in a maximum.
-        largest = if error.is_nan() { f64::INFINITY } else { largest.max(error) };
+        let slopes = slopes(parameter.by * scene.stride, at);
+        for (k, (sought, slope)) in sought.iter().zip(slopes).enumerate() {
+            if !(sought.feels)(parameter) {
+                continue;
+            }
+            let ours = (parameter.of)(&gradients[k], &out);
+            let error = (ours / slope - 1.0).abs();
+            println!("  loss {k}, {}: {ours:.9e} against {slope:.9e}, {error:.1e}", parameter.name);
+            // NaN must not vanish in a maximum.
+            largest[k] = if error.is_nan() { f64::INFINITY } else { largest[k].max(error) };
+        }
     }
     largest
 }
 
-/// As [`largest_error`], of the loss that a run has.
+/// As [`largest_errors`], of the loss that a run has.
 pub fn state_error<'a>(scene: &Scene, run: &Run, parameters: impl IntoIterator<Item = &'a Parameter>) -> f64 {
-    largest_error(scene, run, &|out| out.loss, &|out| out.seeds.clone(), parameters)
+    let [error] = largest_errors(scene, run, [OF_STATE], parameters);
+    error
 }
 
-/// As [`largest_error`], of the force of the floor in the step that the scene looks at, in a direction askew.
-pub fn force_error<'a>(scene: &Scene, run: &Run, parameters: impl IntoIterator<Item = &'a Parameter>) -> f64 {
+/// As [`state_error`], and of another loss.
+pub fn errors_of_state_and<'a>(
+    scene: &Scene,
+    run: &Run,
+    other: Sought<'_>,
+    parameters: impl IntoIterator<Item = &'a Parameter>,
+) -> [f64; 2] {
+    largest_errors(scene, run, [OF_STATE, other], parameters)
+}
+
+/// As [`errors_of_state_and`], of the force of the floor in the step that the scene looks at, in a direction askew.
+pub fn errors_of_state_and_force<'a>(
+    scene: &Scene,
+    run: &Run,
+    feels: &dyn Fn(&Parameter) -> bool,
+    parameters: impl IntoIterator<Item = &'a Parameter>,
+) -> [f64; 2] {
     let across = [0.25, 1.0, -0.5];
-    let force = |out: &Outcome| (0..3).map(|k| across[k] * out.contact_force[k]).sum::<f64>();
+    let loss = |out: &Outcome| (0..3).map(|k| across[k] * out.contact_force[k]).sum::<f64>();
     let seeds = |out: &Outcome| {
         let mut seeds = out.tape.loss();
         seeds.add_contact_force(scene.look, out.floor.unwrap(), across).unwrap();
         seeds
     };
-    largest_error(scene, run, &force, &seeds, parameters)
+    errors_of_state_and(scene, run, Sought { loss: &loss, seeds: &seeds, feels }, parameters)
 }

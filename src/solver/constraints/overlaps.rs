@@ -54,8 +54,8 @@ impl ContactSystem {
 
 /// Whether a step begins with two solids in one another, or with a sheet behind the surface of an obstacle: of deformable sheets and ropes none
 /// is inside the other. While what brings a cloth out counted as made of nothing, 88 % of the steps of one of 441 vertices and 1e6 Pa on a
-/// floor, in which its nodes come to lie by a micrometre, were rejected; none are (`tests/draped.rs`). With ropes too one of 1e6 Pa
-/// gained a fifth of its energy on a slab (`tests/extreme_floors.rs`).
+/// floor, in which its nodes come to lie by a micrometre, were rejected; none are (`tests/thin/draped.rs`). With ropes too one of 1e6 Pa
+/// gained a fifth of its energy on a slab (`tests/extremes/floors.rs`).
 pub(super) fn is_overlap(constraint: &Constraint, bodies: &[BodyProblem]) -> bool {
     let is_inside = |endpoint: &Endpoint| {
         is_solid(endpoint, bodies) || (!is_soft_pair(constraint) && has_sheets(endpoint, bodies))

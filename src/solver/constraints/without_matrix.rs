@@ -40,7 +40,7 @@ impl ContactSystem {
         let is_loose = around.tolerance.relative > LOOSE;
         let error = if is_loose { around.tolerance.relative } else { REDUCTION * self.work.error };
         // Under rigid loads solves that end where four steps of a coarse problem show no descent leave forces off by six times their size.
-        // Without any, a foot of 1e4 Pa under 128 kg that goes on goes 9 cm into the floor at 5 m/s and 1/30 s (`tests/regions.rs` allows 6).
+        // Without any, a foot of 1e4 Pa under 128 kg that goes on goes 9 cm into the floor at 5 m/s and 1/30 s (`tests/solids/regions.rs` allows 6).
         let goes_on = self.has_loads(around.context);
         // The modes of solids carry what holds; those of sheets and ropes, which make their own factors, do not. Always solved for, it takes a
         // solid cube with a box on it 2.5 times as long; not from the start, twice as many cloths that a box hangs from have their steps rejected.
