@@ -12,7 +12,7 @@
 //! | `wind`, `queries`, `recording` | air, rays, files |
 //! | `tactile`, `depth_camera`, `wrench` | touch, as sensors report it |
 //! | `actuators`, `signals` | what drives a world, by name |
-//! | `tape` | gradients over steps |
+//! | `tape`, `tape_loss`, `gradient` | gradients over steps |
 
 mod actuators;
 mod arrays;
@@ -35,6 +35,7 @@ mod depth_camera;
 mod enums;
 mod errors;
 mod events;
+mod gradient;
 mod handles;
 mod joint_builder;
 mod joints;
@@ -52,6 +53,7 @@ mod signals;
 mod snapshots;
 mod tactile;
 mod tape;
+mod tape_loss;
 mod wind;
 mod world;
 mod wrench;
@@ -85,6 +87,8 @@ mod native {
     #[pymodule_export]
     use crate::events::{PyCollisionEvent, PyContactForceEvent};
     #[pymodule_export]
+    use crate::gradient::PyGradient;
+    #[pymodule_export]
     use crate::handles::{
         PyAttachmentHandle, PyCableHandle, PyColliderHandle, PyDeformableHandle, PyJointHandle,
         PyRigidBodyHandle,
@@ -116,7 +120,7 @@ mod native {
     #[pymodule_export]
     use crate::tactile::{PyTactilePad, PyTactileReading};
     #[pymodule_export]
-    use crate::tape::{PyGradient, PyTape};
+    use crate::tape::PyTape;
     #[pymodule_export]
     use crate::world::World;
 

@@ -9,8 +9,7 @@ use rapier3d::prelude::*;
 fn all_ways_of_solving_come_to_the_same_bend() {
     let run = |settings: &dyn Fn(&mut DeformableBody)| {
         let (mut physics, mut deformables) = world(Vector::ZERO);
-        let (finger, _) =
-            finger(&mut deformables, 1.0e6, [0.12, 0.01, 0.006], [12, 4, 4], |c| c.tension(2.0));
+        let (finger, _) = finger(&mut deformables, 1.0e6, [0.12, 0.01, 0.006], [8, 3, 3], |c| c.tension(2.0));
         settings(&mut deformables.bodies[finger]);
         steps(&mut physics, &mut deformables, 150);
         let body = &deformables.bodies[finger];

@@ -73,6 +73,7 @@ pub type Route = fn(DeformableBodyHandle, &DeformableBody, &mut PhysicsWorld) ->
 #[derive(Clone)]
 pub struct Scene {
     pub builder: DeformableBodyBuilder,
+    /// At least up to that which is looked at.
     pub steps: usize,
     /// Height of a floor.
     pub floor: Option<f32>,
@@ -133,7 +134,7 @@ impl Scene {
     pub fn new(builder: DeformableBodyBuilder) -> Self {
         Self {
             builder,
-            steps: 30,
+            steps: 20,
             floor: None,
             regions: Vec::new(),
             beta: None,
@@ -198,7 +199,8 @@ impl Scene {
         let Start { mut physics, mut world, handle, tip, floor, cable } = self.start(run);
         let mut tape = DeformableTape::new(&world, handle).unwrap();
         let (mut losses, mut volumes, mut tension, mut taut) = (Vec::new(), Vec::new(), 0.0, 0);
-        for step in 0..self.steps {
+        let steps = self.steps.max(self.look + 1);
+        for step in 0..steps {
             tape.step(&mut physics, &mut world).unwrap();
             volumes.extend(world.bodies[handle].cavity_volume(0));
             let drawn = cable.map_or(0.0, |cable| world.bodies.cable(cable).unwrap().tension());
@@ -206,7 +208,7 @@ impl Scene {
             if step == self.look {
                 tension = drawn;
             }
-            if step + 1 == self.steps || step + 1 == self.steps / 2 {
+            if step + 1 == steps || step + 1 == steps / 2 {
                 let body = &world.bodies[handle];
                 let at = |v: usize| (body.position(v).unwrap(), body.velocity(v).unwrap());
                 losses.push((step, (0..body.vertex_count()).map(at).collect::<Vec<_>>()));

@@ -104,7 +104,7 @@ fn crushed(nu: f64) -> DeformableMaterial {
 #[test]
 fn crushed_cube_lies_still_after_ten_seconds() {
     for nu in [0.3, 0.45] {
-        for iterations in [1, 3, 10] {
+        for iterations in [1, 10] {
             lies_still(crushed(nu), iterations, 1.0 / 60.0, 10.0);
             lies_still(crushed(nu), iterations, 0.1, 10.0);
             goes_on_lying_still(crushed(nu), iterations, 1.0 / 240.0, 10.0);
@@ -115,7 +115,7 @@ fn crushed_cube_lies_still_after_ten_seconds() {
 #[test]
 fn crushed_cube_lies_still_at_1000_steps_a_second() {
     for nu in [0.3, 0.45] {
-        for iterations in [1, 3, 10] {
+        for iterations in [1, 10] {
             goes_on_lying_still(crushed(nu), iterations, 1e-3, 10.0);
         }
     }

@@ -177,6 +177,30 @@ fn checkpoints_go_around_steps_without_gradients() {
     others.iter().for_each(|other| assert_eq!(first, other));
 }
 
+/// A body may be taken away where a checkpoint is due: the steps that were recorded keep their gradient.
+#[test]
+fn what_is_removed_leaves_the_steps_before_it() {
+    let gradients = [None, Some(3)].map(|every| {
+        let (mut physics, mut world) = (PhysicsWorld::new(), DeformableWorld::new());
+        let beam = cantilever().material(material()).fidelity(Fidelity::Reference).can_sleep(false);
+        let beam = world.insert(beam).unwrap();
+        let mut tape = DeformableTape::new(&world, beam).unwrap();
+        if let Some(every) = every {
+            tape = tape.checkpoint_every(every);
+        }
+        (0..6).for_each(|_| tape.step(&mut physics, &mut world).unwrap());
+        world.remove(beam).unwrap();
+        assert!(tape.step(&mut physics, &mut world).is_err());
+        let mut loss = tape.loss();
+        loss.add_position(5, 4, [1.0, 2.0, 3.0]).unwrap();
+        match every {
+            None => tape.backward(&loss).unwrap(),
+            Some(_) => tape.replay(&loss, |_, _, _| ()).unwrap(),
+        }
+    });
+    assert_eq!(gradients[0], gradients[1]);
+}
+
 /// Positions of the tip of a cantilever over time, with the tape of them.
 fn swing(modulus: f64) -> (DeformableTape, usize, Vec<f64>) {
     let mut physics = PhysicsWorld::new();

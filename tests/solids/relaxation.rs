@@ -73,7 +73,7 @@ fn every_kind_of_element_creeps_as_the_series_says() {
             found
         };
         // At once it would swing: after a tenth of a second.
-        let steps = [24, 120, 480, 2400];
+        let steps = [24, 120, 480];
         let elastic = stretch_after(material().maxwell_branches([]), &[480])[0];
         assert!(elastic > 1e-5, "{name}: {elastic}");
         for (steps, found) in steps.iter().zip(stretch_after(material(), &steps)) {
@@ -105,7 +105,7 @@ fn vibrations_die_away_by_the_loss_factor() {
     };
     let omega = (0..10).fold(omega0, |omega, _| omega0 * at(omega).0.sqrt());
     let expected = 0.5 * at(omega).1 / at(omega).0;
-    let h = 1.0 / 20_000.0;
+    let h = 1.0 / 5_000.0;
     let mut physics = PhysicsWorld::new();
     (physics.gravity, physics.integration_parameters.dt) = (Vector::ZERO, h);
     let mut world = DeformableWorld::new();

@@ -1241,21 +1241,42 @@ class World:
         by: Optional[Union[ColliderHandle, RigidBodyHandle, DeformableBodyHandle]] = None,
     ) -> Tuple[Reals, Reals]: ...
 
+# Derivatives of losses: by steps, and what they are of.
+_RowsByStep = Union[Dict[int, PointsLike], Dict[Tuple[int, DeformableBodyHandle], PointsLike]]
+_ForcesByCollider = Union[
+    Dict[Tuple[int, ColliderHandle], VectorLike], Dict[Tuple[int, ColliderHandle, DeformableBodyHandle], VectorLike]
+]
+_TensionsByCable = Union[Dict[Tuple[int, CableHandle], float], Dict[Tuple[int, CableHandle, DeformableBodyHandle], float]]
+
 @final
 class Tape:
-    def __init__(self, world: World, body: DeformableBodyHandle, checkpoint_every: Optional[int] = None) -> None: ...
+    def __init__(
+        self, world: World, body: Union[DeformableBodyHandle, Sequence[DeformableBodyHandle]], checkpoint_every: Optional[int] = None
+    ) -> None: ...
+    @property
+    def bodies(self) -> List[DeformableBodyHandle]: ...
     def step(self, n: int = 1) -> None: ...
     def __len__(self) -> int: ...
     def clear(self) -> None: ...
-    def contact_force(self, step: int, collider: ColliderHandle) -> Reals: ...
+    def contact_force(self, step: int, collider: ColliderHandle, body: Optional[DeformableBodyHandle] = None) -> Reals: ...
+    def body_force(self, step: int, body: DeformableBodyHandle, other: DeformableBodyHandle) -> Reals: ...
     def backward(
         self,
-        positions: Optional[Dict[int, PointsLike]] = None,
-        velocities: Optional[Dict[int, PointsLike]] = None,
-        contact_forces: Optional[Dict[Tuple[int, ColliderHandle], VectorLike]] = None,
-        tensions: Optional[Dict[Tuple[int, CableHandle], float]] = None,
+        positions: Optional[_RowsByStep] = None,
+        velocities: Optional[_RowsByStep] = None,
+        contact_forces: Optional[_ForcesByCollider] = None,
+        tensions: Optional[_TensionsByCable] = None,
         control: Optional[Callable[[int, World], object]] = None,
     ) -> Gradient: ...
+    def backward_all(
+        self,
+        positions: Optional[_RowsByStep] = None,
+        velocities: Optional[_RowsByStep] = None,
+        contact_forces: Optional[_ForcesByCollider] = None,
+        body_forces: Optional[Dict[Tuple[int, DeformableBodyHandle, DeformableBodyHandle], VectorLike]] = None,
+        tensions: Optional[_TensionsByCable] = None,
+        control: Optional[Callable[[int, World], object]] = None,
+    ) -> Dict[DeformableBodyHandle, Gradient]: ...
 
 @final
 class Gradient:

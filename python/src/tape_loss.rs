@@ -1,0 +1,229 @@
+//! What a loss of a tape depends on, as Python gives it: dicts by steps and handles.
+
+use crate::arrays::{Triple, points};
+use crate::errors::{Failure, bad_value};
+use crate::handles::{PyCableHandle, PyColliderHandle, PyDeformableHandle};
+use foible3d::{BodyError, DeformableLoss, DeformableTape};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// A step, by Python's number, and a body, which a tape of one need not be told.
+#[derive(FromPyObject)]
+enum OfStep {
+    Named(isize, PyDeformableHandle),
+    Alone(isize),
+}
+
+/// A step, a collider, and the body that it touches.
+#[derive(FromPyObject)]
+enum OfCollider {
+    Named(isize, PyColliderHandle, PyDeformableHandle),
+    Alone(isize, PyColliderHandle),
+}
+
+/// A step, a cable, and the body that it runs through.
+#[derive(FromPyObject)]
+enum OfCable {
+    Named(isize, PyCableHandle, PyDeformableHandle),
+    Alone(isize, PyCableHandle),
+}
+
+/// A step, a body, and another one that touches it.
+#[derive(FromPyObject)]
+struct OfPair(isize, PyDeformableHandle, PyDeformableHandle);
+
+/// The bodies of a tape, and its number of steps.
+pub struct Recorded<'a> {
+    pub bodies: &'a [PyDeformableHandle],
+    pub vertices: &'a [usize],
+    pub steps: usize,
+}
+
+impl Recorded<'_> {
+    /// A step by Python's numbers: from the end if negative.
+    pub fn step(&self, step: isize) -> PyResult<usize> {
+        let steps = self.steps;
+        let place = if step < 0 { steps.checked_add_signed(step) } else { Some(step as usize) };
+        place
+            .filter(|place| *place < steps)
+            .ok_or_else(|| bad_value(format!("step {step} is not among the {steps} of the tape")))
+    }
+
+    /// The place of a body; a tape of one need not be told.
+    pub fn place(&self, body: Option<PyDeformableHandle>, of: &str) -> PyResult<usize> {
+        match body {
+            None if self.bodies.len() > 1 => {
+                Err(bad_value(format!("{of}: the tape is of several bodies, and this names none of them")))
+            }
+            None => Ok(0),
+            Some(body) => self.bodies.iter().position(|own| *own == body).ok_or_else(|| {
+                let (index, generation) = body.parts();
+                bad_value(format!(
+                    "{of}: the body at slot {index} of generation {generation} is not on the tape"
+                ))
+            }),
+        }
+    }
+
+    /// Whether two bodies of the tape are not one.
+    pub fn other(&self, body: PyDeformableHandle, other: PyDeformableHandle, of: &str) -> PyResult<()> {
+        if self.place(Some(body), of)? == self.place(Some(other), of)? {
+            return Err(bad_value(format!("{of}: a body has no force on itself")));
+        }
+        Ok(())
+    }
+
+    fn step_and_place(
+        &self,
+        step: isize,
+        body: Option<PyDeformableHandle>,
+        of: &str,
+    ) -> PyResult<[usize; 2]> {
+        Ok([self.step(step)?, self.place(body, of)?])
+    }
+}
+
+/// Derivatives by step and place of a body.
+#[derive(Default)]
+pub struct Seeds {
+    positions: Vec<([usize; 2], Vec<[f64; 3]>)>,
+    velocities: Vec<([usize; 2], Vec<[f64; 3]>)>,
+    contact_forces: Vec<([usize; 2], PyColliderHandle, [f64; 3])>,
+    body_forces: Vec<([usize; 2], PyDeformableHandle, [f64; 3])>,
+    tensions: Vec<([usize; 2], PyCableHandle, f64)>,
+}
+
+impl Seeds {
+    /// Rows of derivatives with respect to the places of vertices, and to their velocities.
+    pub fn of_vertices(
+        recorded: &Recorded<'_>,
+        positions: Option<&Bound<'_, PyDict>>,
+        velocities: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let (positions, velocities) =
+            (by_step(recorded, positions, "positions")?, by_step(recorded, velocities, "velocities")?);
+        Ok(Self { positions, velocities, ..Self::default() })
+    }
+
+    /// Derivatives with respect to forces of colliders and of other bodies, and to tensions.
+    pub fn add_forces(
+        &mut self,
+        recorded: &Recorded<'_>,
+        [contact_forces, body_forces, tensions]: &[Option<Bound<'_, PyDict>>; 3],
+    ) -> PyResult<()> {
+        for (key, of) in pairs(contact_forces.as_ref(), "contact_forces")? {
+            let keys = "(step, collider) or (step, collider, body)";
+            let (step, collider, body) = match key_of(&key, "contact_forces", keys)? {
+                OfCollider::Named(step, collider, body) => (step, collider, Some(body)),
+                OfCollider::Alone(step, collider) => (step, collider, None),
+            };
+            let at = recorded.step_and_place(step, body, "contact_forces")?;
+            self.contact_forces.push((at, collider, value_of::<Triple>(&of, "contact_forces")?.0));
+        }
+        for (key, of) in pairs(body_forces.as_ref(), "body_forces")? {
+            let OfPair(step, body, other) = key_of(&key, "body_forces", "(step, body, other)")?;
+            let at = recorded.step_and_place(step, Some(body), "body_forces")?;
+            recorded.other(body, other, "body_forces")?;
+            self.body_forces.push((at, other, value_of::<Triple>(&of, "body_forces")?.0));
+        }
+        for (key, of) in pairs(tensions.as_ref(), "tensions")? {
+            let keys = "(step, cable) or (step, cable, body)";
+            let (step, cable, body) = match key_of(&key, "tensions", keys)? {
+                OfCable::Named(step, cable, body) => (step, cable, Some(body)),
+                OfCable::Alone(step, cable) => (step, cable, None),
+            };
+            let at = recorded.step_and_place(step, body, "tensions")?;
+            self.tensions.push((at, cable, value_of(&of, "tensions")?));
+        }
+        Ok(())
+    }
+
+    /// The losses of a tape's bodies.
+    pub fn losses(&self, tape: &DeformableTape) -> Result<Vec<DeformableLoss>, Failure> {
+        let mut losses = tape.losses();
+        for ([step, place], rows) in &self.positions {
+            each(rows, |vertex, row| losses[*place].add_position(*step, vertex, row))?;
+        }
+        for ([step, place], rows) in &self.velocities {
+            each(rows, |vertex, row| losses[*place].add_velocity(*step, vertex, row))?;
+        }
+        for ([step, place], collider, of) in &self.contact_forces {
+            losses[*place].add_contact_force(*step, collider.0, *of)?;
+        }
+        for ([step, place], other, of) in &self.body_forces {
+            losses[*place].add_body_force(*step, other.0, *of)?;
+        }
+        for ([step, place], cable, of) in &self.tensions {
+            losses[*place].add_tension(*step, cable.0, *of)?;
+        }
+        Ok(losses)
+    }
+}
+
+/// What a dict holds, by itself: reading a value may run code of the user's, which may change the dict.
+fn pairs<'py>(
+    given: Option<&Bound<'py, PyDict>>,
+    name: &str,
+) -> PyResult<Vec<(Bound<'py, PyAny>, Bound<'py, PyAny>)>> {
+    let items = given.map(|given| given.items());
+    items.iter().flatten().map(|item| item.extract().map_err(|error| told(error, name))).collect()
+}
+
+/// A key of a dict, of this form.
+fn key_of<'py, K: for<'a> FromPyObject<'a, 'py>>(
+    key: &Bound<'py, PyAny>,
+    name: &str,
+    form: &str,
+) -> PyResult<K> {
+    key.extract().map_err(|_| PyTypeError::new_err(format!("{name}: expected {form}, got {key:?}")))
+}
+
+fn value_of<'py, V>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<V>
+where
+    V: for<'a> FromPyObject<'a, 'py, Error = PyErr>,
+{
+    value.extract().map_err(|error| told(error, name))
+}
+
+/// An error that says in which argument.
+fn told(error: PyErr, name: &str) -> PyErr {
+    Python::attach(|py| PyTypeError::new_err(format!("{name}: {}", error.value(py))))
+}
+
+/// Rows of derivatives by steps and bodies.
+fn by_step(
+    recorded: &Recorded<'_>,
+    given: Option<&Bound<'_, PyDict>>,
+    name: &str,
+) -> PyResult<Vec<([usize; 2], Vec<[f64; 3]>)>> {
+    let mut found: Vec<([usize; 2], Vec<[f64; 3]>)> = Vec::new();
+    for (key, rows) in pairs(given, name)? {
+        let (step, body) = match key_of(&key, name, "a step or (step, body)")? {
+            OfStep::Named(step, body) => (step, Some(body)),
+            OfStep::Alone(step) => (step, None),
+        };
+        let at = recorded.step_and_place(step, body, name)?;
+        let rows = points(&rows, name)?;
+        let (count, vertices) = (rows.len(), recorded.vertices[at[1]]);
+        if count != vertices {
+            return Err(bad_value(format!(
+                "{name} of step {step} has {count} rows, but the body {vertices} vertices"
+            )));
+        }
+        if found.iter().any(|(other, _)| *other == at) {
+            return Err(bad_value(format!("{name} name step {} twice", at[0])));
+        }
+        found.push((at, rows));
+    }
+    Ok(found)
+}
+
+/// Adds rows that say anything to a loss.
+fn each(
+    rows: &[[f64; 3]],
+    mut add: impl FnMut(usize, [f64; 3]) -> Result<(), BodyError>,
+) -> Result<(), Failure> {
+    let mut said = rows.iter().enumerate().filter(|(_, row)| **row != [0.0; 3]);
+    said.try_for_each(|(vertex, row)| add(vertex, *row)).map_err(Failure::from)
+}
