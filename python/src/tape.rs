@@ -200,7 +200,7 @@ impl PyTape {
     /// their end: ``(step, body)``, ``(step, collider, body)``, ``(step, cable, body)``. `body_forces` [1/N], a dict of three numbers by ``(step, body,
     /// other)``, is of the force of another body of the tape on one of it.
     #[pyo3(signature = (positions = None, velocities = None, contact_forces = None, body_forces = None, tensions = None, control = None))]
-    #[expect(clippy::too_many_arguments)]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
     fn backward_all<'py>(
         &self,
         py: Python<'py>,
