@@ -1,6 +1,7 @@
 //! Many deformable bodies on one another.
 use crate::common::soft_bodies::*;
 use crate::common::*;
+#[cfg(feature = "parallel")]
 use foible3d::DeformableState;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
