@@ -15,18 +15,20 @@ enum OfStep {
     Alone(isize),
 }
 
-/// A step, a collider, and the body that it touches.
+/// A step, the handle of a collider or a cable, and the body that it touches or runs through.
 #[derive(FromPyObject)]
-enum OfCollider {
-    Named(isize, PyColliderHandle, PyDeformableHandle),
-    Alone(isize, PyColliderHandle),
+enum Of<H> {
+    Named(isize, H, PyDeformableHandle),
+    Alone(isize, H),
 }
 
-/// A step, a cable, and the body that it runs through.
-#[derive(FromPyObject)]
-enum OfCable {
-    Named(isize, PyCableHandle, PyDeformableHandle),
-    Alone(isize, PyCableHandle),
+impl<H> Of<H> {
+    fn parts(self) -> (isize, H, Option<PyDeformableHandle>) {
+        match self {
+            Self::Named(step, of, body) => (step, of, Some(body)),
+            Self::Alone(step, of) => (step, of, None),
+        }
+    }
 }
 
 /// A step, a body, and another one that touches it.
@@ -114,10 +116,8 @@ impl Seeds {
     ) -> PyResult<()> {
         for (key, of) in pairs(contact_forces.as_ref(), "contact_forces")? {
             let keys = "(step, collider) or (step, collider, body)";
-            let (step, collider, body) = match key_of(&key, "contact_forces", keys)? {
-                OfCollider::Named(step, collider, body) => (step, collider, Some(body)),
-                OfCollider::Alone(step, collider) => (step, collider, None),
-            };
+            let (step, collider, body) =
+                key_of::<Of<PyColliderHandle>>(&key, "contact_forces", keys)?.parts();
             let at = recorded.step_and_place(step, body, "contact_forces")?;
             self.contact_forces.push((at, collider, value_of::<Triple>(&of, "contact_forces")?.0));
         }
@@ -129,10 +129,7 @@ impl Seeds {
         }
         for (key, of) in pairs(tensions.as_ref(), "tensions")? {
             let keys = "(step, cable) or (step, cable, body)";
-            let (step, cable, body) = match key_of(&key, "tensions", keys)? {
-                OfCable::Named(step, cable, body) => (step, cable, Some(body)),
-                OfCable::Alone(step, cable) => (step, cable, None),
-            };
+            let (step, cable, body) = key_of::<Of<PyCableHandle>>(&key, "tensions", keys)?.parts();
             let at = recorded.step_and_place(step, body, "tensions")?;
             self.tensions.push((at, cable, value_of(&of, "tensions")?));
         }

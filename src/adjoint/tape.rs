@@ -157,18 +157,21 @@ impl DeformableTape {
         take: impl FnOnce(&mut PhysicsWorld, &mut DeformableWorld),
     ) -> Result<(), DeformableBodyError> {
         let step = self.len();
-        if self.checkpoint_every.is_some_and(|every| self.is_interrupted || step.is_multiple_of(every)) {
-            let checkpoint = Checkpoint::new(step, &self.led_to(step), physics, deformables);
-            self.checkpoints.pop_if(|last| last.step == step);
+        let is_due =
+            self.checkpoint_every.is_some_and(|every| self.is_interrupted || step.is_multiple_of(every));
+        let checkpoint = is_due.then(|| Checkpoint::new(step, &self.led_to(step), physics, deformables));
+        let gravity = from_real(physics.gravity);
+        take(physics, deformables);
+        let record = self.record_of(physics, deformables, gravity);
+        self.is_interrupted = record.is_err();
+        let record = record?;
+        if let Some(checkpoint) = checkpoint {
             self.forgotten = step;
             self.steps.clear();
             self.checkpoints.push(checkpoint);
         }
-        let gravity = from_real(physics.gravity);
-        take(physics, deformables);
-        let added = self.add(physics, deformables, gravity);
-        self.is_interrupted = added.is_err();
-        added
+        self.steps.push(record);
+        Ok(())
     }
 
     /// Where the step before one has left the bodies: of steps that are kept, or that a checkpoint comes after.
@@ -193,22 +196,23 @@ impl DeformableTape {
             let what = "with checkpoints a tape has to take its steps by itself";
             return Err(BodyError::NoGradient { step: self.len(), what }.into());
         }
-        self.add(physics, deformables, from_real(physics.gravity))
+        let record = self.record_of(physics, deformables, from_real(physics.gravity))?;
+        self.steps.push(record);
+        Ok(())
     }
 
-    fn add(
-        &mut self,
+    fn record_of(
+        &self,
         physics: &PhysicsWorld,
         deformables: &DeformableWorld,
         gravity: Vec3,
-    ) -> Result<(), DeformableBodyError> {
+    ) -> Result<StepRecord, DeformableBodyError> {
         let step = self.len();
         for body in self.bodies.iter() {
             deformables.bodies.get(*body).ok_or_else(|| body.no_such_body())?;
         }
         let record = StepRecord::new((&self.bodies, &self.models), (physics, deformables), gravity);
-        self.steps.push(record.map_err(|what| BodyError::NoGradient { step, what })?);
-        Ok(())
+        Ok(record.map_err(|what| BodyError::NoGradient { step, what })?)
     }
 
     /// Number of steps.

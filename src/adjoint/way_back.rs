@@ -79,8 +79,7 @@ impl DeformableTape {
         let mut gradients = self.begin(losses)?;
         let mut back = self.back()?;
         let mut end = self.len();
-        // One that no step was recorded after may lack the bodies.
-        for checkpoint in self.checkpoints.iter().rev().filter(|checkpoint| checkpoint.step < self.len()) {
+        for checkpoint in self.checkpoints.iter().rev() {
             let (mut physics, mut deformables) = checkpoint.worlds();
             let mut part = Self::of_bodies(&deformables, &self.bodies)?;
             for step in checkpoint.step..end {

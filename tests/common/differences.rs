@@ -262,7 +262,7 @@ const OF_STATE: Sought<'static> =
     Sought { loss: &|out| out.loss, seeds: &|out| out.seeds.clone(), feels: &|_| true };
 
 /// The largest relative errors of the tape's derivatives of some losses against differences of the fourth order between whole runs.
-pub fn largest_errors<'a, const N: usize>(
+fn largest_errors<'a, const N: usize>(
     scene: &Scene,
     run: &Run,
     sought: [Sought<'_>; N],

@@ -5,6 +5,7 @@ mod common;
 
 mod accuracy;
 mod between;
+mod cases;
 mod crowds;
 mod fast;
 mod friction;

@@ -63,20 +63,32 @@ fn balls_return_with_their_speed_and_the_right_force() {
     }
 }
 
-#[test]
-fn no_step_of_a_bounce_makes_energy() {
+/// Any two values of different lists come together in the bounces whose places add up to one of the remainders by three.
+fn bounces_make_no_energy(remainders: &[usize]) {
     let shapes: [&dyn Shape; 3] =
         [&Ball::new(0.5), &Cuboid::new(Vector::splat(0.5)), &Cylinder::new(0.5, 0.3)];
-    // Any two values of different lists come together.
     for (a, shape) in shapes.into_iter().enumerate() {
         for (b, e) in [1e4, 1e6, 1e8].into_iter().enumerate() {
-            let per_second = [30, 60, 240][(a + b) % 3];
-            let found = bounce(shape, e, per_second, Integrator::Bdf2);
-            let (kind, returned, gain) = (shape.shape_type(), found.returned, found.gain);
-            println!("{kind:?} {e:e} Pa, 1/{per_second} s: {returned:.3} {gain:.1e}");
-            assert!(gain < 2e-3 && returned < 1.0, "{e} {per_second}: {gain}");
+            for remainder in remainders {
+                let per_second = [30, 60, 240][(a + b + remainder) % 3];
+                let found = bounce(shape, e, per_second, Integrator::Bdf2);
+                let (kind, returned, gain) = (shape.shape_type(), found.returned, found.gain);
+                println!("{kind:?} {e:e} Pa, 1/{per_second} s: {returned:.3} {gain:.1e}");
+                assert!(gain < 2e-3 && returned < 1.0, "{e} {per_second}: {gain}");
+            }
         }
     }
+}
+
+#[test]
+fn no_step_of_a_bounce_makes_energy() {
+    bounces_make_no_energy(&[0]);
+}
+
+#[test]
+#[ignore = "slow tier"]
+fn no_step_of_the_other_bounces_makes_energy() {
+    bounces_make_no_energy(&[1, 2]);
 }
 
 #[test]

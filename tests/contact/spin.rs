@@ -120,8 +120,8 @@ fn slab() -> ColliderBuilder {
     ColliderBuilder::cuboid(5.0, 0.5, 5.0).translation(Vector::Y * -0.5)
 }
 
-#[test]
-fn discs_and_balls_roll_down_a_slope_as_rigid_ones_do() {
+/// Those of which any two of body, stiffness, step and floor come together, but a disc at 1/240 s at one stiffness only; or the others.
+fn roll_down_a_slope_as_rigid_ones_do(others: bool) {
     // To 13 rad/s: a fifth of a radian in a step of 1/60 s.
     let slope = 0.2f32;
     let pull = 9.81 * f64::from(slope.sin());
@@ -131,16 +131,35 @@ fn discs_and_balls_roll_down_a_slope_as_rigid_ones_do() {
         for (a, e_modulus) in [1e6, 1e7, 1e8].into_iter().enumerate() {
             for (b, h) in [1.0 / 60.0, 1.0 / 240.0].into_iter().enumerate() {
                 // A ball of eight cells that yields nowhere tips from facet to facet where steps are short enough to see it.
-                if what == "ball" && e_modulus == 1e8 && h < 0.01 || what == "disc" && a != 1 && b == 1 {
+                if what == "ball" && e_modulus == 1e8 && h < 0.01 {
                     continue;
                 }
                 // What rolls on a soft ball's own dent loses a little.
                 let allowed = if what == "ball" && e_modulus == 1e6 { 0.03 } else { 0.02 };
-                let (floor, collider) = if (a + b) % 2 == 0 { ("slab", slab()) } else { ("sheet", sheet()) };
-                let share = acceleration(mesh, e_modulus, h, slope, collider) * (1.0 + inertia) / pull;
-                println!("{what}, {e_modulus:.0e} Pa, {h:.4} s, {floor}: {share:.4}");
-                assert!((share - 1.0).abs() < allowed, "{what}, {e_modulus:e} Pa, {h} s, {floor}: {share}");
+                let is_long = what == "disc" && a != 1 && b == 1;
+                for (c, (floor, collider)) in [("slab", slab()), ("sheet", sheet())].into_iter().enumerate() {
+                    if ((a + b + c) % 2 == 1 || is_long) != others {
+                        continue;
+                    }
+                    let share = acceleration(mesh, e_modulus, h, slope, collider) * (1.0 + inertia) / pull;
+                    println!("{what}, {e_modulus:.0e} Pa, {h:.4} s, {floor}: {share:.4}");
+                    assert!(
+                        (share - 1.0).abs() < allowed,
+                        "{what}, {e_modulus:e} Pa, {h} s, {floor}: {share}"
+                    );
+                }
             }
         }
     }
+}
+
+#[test]
+fn discs_and_balls_roll_down_a_slope_as_rigid_ones_do() {
+    roll_down_a_slope_as_rigid_ones_do(false);
+}
+
+#[test]
+#[ignore = "slow tier"]
+fn the_other_discs_and_balls_roll_down_a_slope_as_rigid_ones_do() {
+    roll_down_a_slope_as_rigid_ones_do(true);
 }
