@@ -2,6 +2,7 @@
 use crate::common::*;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
+use rayon::prelude::*;
 
 const BOTH: [Integrator; 2] = [Integrator::ImplicitEuler, Integrator::Bdf2];
 
@@ -177,9 +178,9 @@ fn what_slides_stops_where_coulomb_says() {
 
 #[test]
 fn what_lands_comes_to_rest() {
-    for (e, beta, per_second) in
-        [(1e5, 0.01, 60), (1e5, 0.02, 240), (1e6, 0.0, 60), (1e6, 0.003, 60), (1e8, 0.0, 60), (1e9, 0.0, 60)]
-    {
+    let cases =
+        [(1e5, 0.01, 60), (1e5, 0.02, 240), (1e6, 0.0, 60), (1e6, 0.003, 60), (1e8, 0.0, 60), (1e9, 0.0, 60)];
+    cases.into_par_iter().for_each(|(e, beta, per_second)| {
         let (mut physics, floor) = world_with_floor(1.0 / per_second as f32);
         let mut world = DeformableWorld::new();
         let settings = SolverSettings::default().integrator(Integrator::Bdf2);
@@ -201,7 +202,7 @@ fn what_lands_comes_to_rest() {
         // Of 1e9 Pa as by implicit Euler, 2e-5 m/s.
         let bound = if e < 1e9 { 1e-5 } else { 1e-4 };
         assert!(speed < bound && (force / weight - 1.0).abs() < bound, "{e} {beta}: {speed} {force}");
-    }
+    });
 }
 
 /// A bar (0.5 m) that swings under its own weight.

@@ -1,6 +1,7 @@
 //! Multibodies with links that have no inertia, or next to none.
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
+use rayon::prelude::*;
 
 /// A root, what is between, and a hub that carries a soft block and is turned by a motor.
 #[derive(Clone, Copy, Debug)]
@@ -109,11 +110,10 @@ fn random_machines(count: usize, seed: u64) -> usize {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as f32 / (1u64 << 31) as f32
     };
-    let mut thrown = 0;
-    for _ in 0..count {
+    let mut machine = || {
         let mut pick = |of: &[f32]| of[(random() * of.len() as f32) as usize % of.len()];
         let (masses, inertias) = ([1e-3, 0.1, 1.0, 20.0], [0.0, 0.0, 1e-9, 1e-6, 1e-4, 1e-2]);
-        let machine = Machine {
+        Machine {
             root: (pick(&masses), pick(&inertias)),
             between: (pick(&[0.0, 1.0]) > 0.0).then_some((pick(&masses), pick(&inertias))),
             hub: pick(&[0.02, 0.1, 0.3]),
@@ -123,14 +123,18 @@ fn random_machines(count: usize, seed: u64) -> usize {
             damping: (pick(&[0.0, 0.0, 1.0]) > 0.0).then_some(1e-3),
             gravity: pick(&[0.0, 1.0]) > 0.0,
             dt: pick(&[1.0 / 240.0, 1.0 / 60.0, 1.0 / 30.0]),
-        };
+        }
+    };
+    let machines: Vec<Machine> = (0..count).map(|_| machine()).collect();
+    let is_thrown = |machine: &&Machine| {
         let [speed, turn] = machine.run();
-        if !(speed < 60.0 && turn < 1e4) {
-            thrown += 1;
+        let is_thrown = !(speed < 60.0 && turn < 1e4);
+        if is_thrown {
             println!("{machine:?}: {speed:.1e} m/s, {turn:.1e} rad/s");
         }
-    }
-    thrown
+        is_thrown
+    };
+    machines.par_iter().filter(is_thrown).count()
 }
 
 #[test]

@@ -3,6 +3,7 @@ use crate::common::thin::*;
 use crate::common::*;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
+use rayon::prelude::*;
 
 /// Newton's method until nothing but rounding is left.
 fn converged() -> SolverSettings {
@@ -51,7 +52,7 @@ fn large_strips_come_to_rest_where_the_converged_do() {
 
 #[test]
 fn curtains_of_cotton_hang_where_the_converged_do() {
-    for dt in [1.0 / 20.0, 1.0 / 60.0, 1.0 / 240.0] {
+    [1.0 / 20.0, 1.0 / 60.0, 1.0 / 240.0].into_par_iter().for_each(|dt| {
         let curtain = || {
             DeformableBodyBuilder::cloth([0.5, 0.5], [20, 20], 1e-3)
                 .material(DeformableMaterial::new(1e6, 0.3).density(400.0).mass_damping(4.0))
@@ -62,7 +63,7 @@ fn curtains_of_cotton_hang_where_the_converged_do() {
         let off = farthest(&found.0, &truth.0);
         println!("steps of {dt:.4} s: off by {off:.1e} m, {:.1e} m/s", found.1);
         assert!(off < 1e-5, "{dt} s: {off} m, {} m/s", found.1);
-    }
+    });
 }
 
 #[test]
@@ -97,9 +98,9 @@ fn energy(world: &DeformableWorld, body: DeformableBodyHandle) -> f64 {
 
 #[test]
 fn curtains_that_swing_against_walls_make_no_energy() {
-    for (e, dt) in
-        [(1e4, 1.0 / 60.0), (1e6, 1.0 / 60.0), (1e8, 1.0 / 60.0), (1e9, 1.0 / 30.0), (1e7, 1.0 / 240.0)]
-    {
+    let cases =
+        [(1e4, 1.0 / 60.0), (1e6, 1.0 / 60.0), (1e8, 1.0 / 60.0), (1e9, 1.0 / 30.0), (1e7, 1.0 / 240.0)];
+    cases.into_par_iter().for_each(|(e, dt)| {
         let mut physics = PhysicsWorld::new();
         physics.integration_parameters.dt = dt;
         // It swings down from where it lies flat, against the wall, and sweeps over the floor.
@@ -127,7 +128,7 @@ fn curtains_that_swing_against_walls_make_no_energy() {
             (highest - start) / scale
         );
         assert!(touched > 10 && highest - start < 1e-3 * scale, "{e:e} Pa: {start} J to {highest} J");
-    }
+    });
 }
 
 /// How high the lowest vertex of what is draped is when it falls asleep \[m\], and when that is \[s\].
