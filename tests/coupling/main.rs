@@ -4,6 +4,7 @@
 mod common;
 
 mod attachments;
+mod changing_floors;
 mod control;
 mod drag;
 mod forces;
