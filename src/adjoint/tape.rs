@@ -126,9 +126,11 @@ impl DeformableTape {
     }
 
     /// Keeps both worlds every so many steps, at least one, and the steps since: memory for `n/every` worlds and `every` steps in
-    /// the place of n. The gradient is that of [`DeformableTape::replay`] then, which steps each once more.
+    /// the place of n. The gradient is that of [`DeformableTape::replay`] then, which steps each once more. Steps that were recorded before,
+    /// without a world to replay them from, are forgotten.
     #[must_use]
     pub fn checkpoint_every(mut self, every: usize) -> Self {
+        self.clear();
         self.checkpoint_every = Some(every.max(1));
         self
     }

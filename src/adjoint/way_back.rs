@@ -41,7 +41,8 @@ impl DeformableTape {
     }
 
     /// As [`DeformableTape::backward`], from checkpoints: the steps between them are taken again, on copies of the worlds.
-    /// `control` has to do before each step, of which it is told the number, what was done then.
+    /// `control` has to do before each step, of which it is told the number, what was done then. Without checkpoints all steps are kept,
+    /// and none is taken again.
     ///
     /// # Errors
     /// As [`DeformableTape::backward`], and if the steps lead elsewhere than they did.
@@ -76,12 +77,17 @@ impl DeformableTape {
         mut control: impl FnMut(usize, &mut PhysicsWorld, &mut DeformableWorld),
         mut take: impl FnMut(&mut PhysicsWorld, &mut DeformableWorld),
     ) -> Result<Vec<DeformableGradient>, DeformableBodyError> {
+        if self.checkpoints.is_empty() {
+            return Ok(self.backward_all(losses)?);
+        }
         let mut gradients = self.begin(losses)?;
         let mut back = self.back()?;
         let mut end = self.len();
         for checkpoint in self.checkpoints.iter().rev() {
             let (mut physics, mut deformables) = checkpoint.worlds();
             let mut part = Self::of_bodies(&deformables, &self.bodies)?;
+            // Its steps have the numbers of these, in errors too.
+            part.forgotten = checkpoint.step;
             for step in checkpoint.step..end {
                 // Before its own step a checkpoint was taken.
                 if step > checkpoint.step {

@@ -177,6 +177,49 @@ fn checkpoints_go_around_steps_without_gradients() {
     others.iter().for_each(|other| assert_eq!(first, other));
 }
 
+/// Without checkpoints nothing has to be replayed; with them from some step on the tape begins there. Both once had gradients of zero, or of the
+/// wrong start. A step of a replay that has none is told by its number in the tape, once that since the checkpoint.
+#[test]
+fn replays_are_of_all_that_a_tape_holds() {
+    let (mut physics, mut world) = (PhysicsWorld::new(), DeformableWorld::new());
+    let beam = cantilever().material(material()).fidelity(Fidelity::Reference).can_sleep(false);
+    let beam = world.insert(beam).unwrap();
+    let mut whole = DeformableTape::new(&world, beam).unwrap();
+    (0..5).for_each(|_| whole.step(&mut physics, &mut world).unwrap());
+    let with_loss = |tape: &DeformableTape| {
+        let mut loss = tape.loss();
+        loss.add_position(tape.len() - 1, 4, [1.0, 2.0, 3.0]).unwrap();
+        loss
+    };
+    let loss = with_loss(&whole);
+    let replayed = whole.replay(&loss, |_, _, _| ()).unwrap();
+    assert!(replayed.steps.len() == 5 && replayed.material().youngs_modulus != 0.0);
+    assert_eq!(replayed, whole.backward(&loss).unwrap());
+
+    let mut checked = whole.checkpoint_every(4);
+    assert!(checked.is_empty());
+    let mut kept = DeformableTape::new(&world, beam).unwrap();
+    for _ in 0..10 {
+        checked.step(&mut physics, &mut world).unwrap();
+        kept.record(&physics, &world).unwrap();
+    }
+    let loss = with_loss(&checked);
+    let replayed = checked.replay(&loss, |_, _, _| ()).unwrap();
+    assert_eq!(replayed, kept.backward(&with_loss(&kept)).unwrap());
+
+    let unsolved = |step: usize, _: &mut PhysicsWorld, world: &mut DeformableWorld| {
+        if step == 6 {
+            let settings = world.bodies[beam].settings().tolerance(1e-2).max_iterations(1);
+            world.bodies[beam].set_settings(settings);
+        }
+    };
+    let error = checked.replay(&loss, unsolved).unwrap_err();
+    assert!(
+        matches!(error, DeformableBodyError::Body(foible3d::BodyError::NoGradient { step: 6, .. })),
+        "{error:?}"
+    );
+}
+
 /// A body may be taken away where a checkpoint is due: the steps that were recorded keep their gradient.
 #[test]
 fn what_is_removed_leaves_the_steps_before_it() {
