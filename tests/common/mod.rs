@@ -37,6 +37,22 @@ pub fn cube(material: DeformableMaterial, y: f32) -> DeformableBodyBuilder {
         .can_sleep(false)
 }
 
+/// A gutter along x that opens by `angle` \[rad\] from the line y = z = 0, its walls in `parts` strips along it.
+pub fn gutter(angle: f64, parts: usize) -> ColliderBuilder {
+    let (mut points, mut faces) = (Vec::new(), Vec::new());
+    let (s, c) = ((0.5 * angle).sin() as f32, (0.5 * angle).cos() as f32);
+    for k in 0..=parts {
+        let x = 6.0 * k as f32 / parts as f32 - 3.0;
+        points.extend([Vector::new(x, c, -s), Vector::new(x, 0.0, 0.0), Vector::new(x, c, s)]);
+    }
+    for k in 0..parts as u32 {
+        for i in [3 * k, 3 * k + 1] {
+            faces.extend([[i, i + 1, i + 3], [i + 1, i + 4, i + 3]]);
+        }
+    }
+    ColliderBuilder::trimesh(points, faces).unwrap().friction(0.1)
+}
+
 /// Vertices of a body whose rest position satisfies a condition.
 pub fn at_rest_where(body: &DeformableBody, condition: impl Fn([f64; 3]) -> bool) -> Vec<usize> {
     (0..body.vertex_count()).filter(|&v| condition(body.model().rest_position(v))).collect()

@@ -1,8 +1,8 @@
 //! What lies on a floor that is removed, switched off, given another shape or moved.
+use crate::common::{G, gutter};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 
-const G: f64 = 9.81;
 const DT: f32 = 1.0 / 60.0;
 
 #[derive(Clone, Copy, Debug)]
@@ -23,13 +23,6 @@ enum Thing {
 const FLOORS: [Floor; 3] = [Floor::Cuboid, Floor::Heightfield, Floor::Gutter];
 const THINGS: [Thing; 3] = [Thing::Cube, Thing::Cloth, Thing::Rope];
 
-fn gutter() -> ColliderBuilder {
-    let points = [-3.0f32, 3.0].into_iter();
-    let points =
-        points.flat_map(|x| [(1.0, -1.0), (0.0, 0.0), (1.0, 1.0)].map(|(y, z)| Vector::new(x, y, z)));
-    ColliderBuilder::trimesh(points.collect(), vec![[0, 1, 3], [1, 4, 3], [1, 2, 4], [2, 5, 4]]).unwrap()
-}
-
 fn floor(of: Floor) -> ColliderBuilder {
     let collider = match of {
         Floor::Cuboid => ColliderBuilder::cuboid(3.0, 0.1, 3.0).translation(Vector::Y * -0.1),
@@ -37,7 +30,7 @@ fn floor(of: Floor) -> ColliderBuilder {
             let flat = rapier3d::parry::utils::Array2::new(9, 9, vec![0.0; 81]);
             ColliderBuilder::heightfield(flat, Vector::new(6.0, 1.0, 6.0))
         }
-        Floor::Gutter => gutter(),
+        Floor::Gutter => gutter(std::f64::consts::FRAC_PI_2, 1),
     };
     collider.friction(0.3)
 }
@@ -158,7 +151,8 @@ fn what_lies_on_a_floor_that_changes_lies_on_what_it_has_become() {
     }
 }
 
-/// Along its walls, across them, up, about the vertical, and about its line until one wall is nearly level: what lies in a gutter goes with it, and stays above both walls.
+/// Along its walls, across them, up, about the vertical, and about its line until one wall is nearly level: what lies in a gutter goes with it,
+/// and stays above both walls.
 #[test]
 fn what_lies_in_a_gutter_that_moves_goes_with_it() {
     let still = Vector::ZERO;

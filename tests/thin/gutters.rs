@@ -1,24 +1,9 @@
 //! Ropes and sheets in hollows of one mesh, where a node lies on two of its faces.
+use crate::common::gutter;
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 
 const RADIUS: f64 = 0.01;
-
-/// A gutter along x that opens by `angle` \[rad\] from the line y = z = 0, its walls in `parts` strips along it.
-fn gutter(angle: f64, parts: usize) -> ColliderBuilder {
-    let (mut points, mut faces) = (Vec::new(), Vec::new());
-    let (s, c) = ((0.5 * angle).sin() as f32, (0.5 * angle).cos() as f32);
-    for k in 0..=parts {
-        let x = 6.0 * k as f32 / parts as f32 - 3.0;
-        points.extend([Vector::new(x, c, -s), Vector::new(x, 0.0, 0.0), Vector::new(x, c, s)]);
-    }
-    for k in 0..parts as u32 {
-        for i in [3 * k, 3 * k + 1] {
-            faces.extend([[i, i + 1, i + 3], [i + 1, i + 4, i + 3]]);
-        }
-    }
-    ColliderBuilder::trimesh(points, faces).unwrap().friction(0.1)
-}
 
 fn rope(z: f32, y: f32) -> DeformableBodyBuilder {
     let points: Vec<Vector> = (0..=16).map(|k| Vector::X * (0.025 * k as f32 - 0.2)).collect();
