@@ -95,8 +95,8 @@ mod export;
 mod touch;
 
 pub use adjoint::{
-    CableGradient, DeformableGradient, DeformableLoss, DeformableTape, MaterialGradient, StepGradient,
-    WindGradient, WovenGradient,
+    CableGradient, DeformableGradient, DeformableLoss, DeformableTape, MaterialGradient, RigidBodyGradient,
+    RigidStepGradient, StepGradient, WindGradient, WovenGradient,
 };
 pub use body::{
     Acceleration, AttachTo, CablePoint, DeformableAttachment, DeformableAttachmentHandle, DeformableBody,

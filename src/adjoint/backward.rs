@@ -5,11 +5,14 @@
 
 use super::cables::{CableRecord, EndOfCable, OfCable};
 use super::filled_rooms::of_pressures;
-use super::gradient::{CableGradient, DeformableGradient, MaterialGradient, StepGradient};
+use super::gradient::{
+    CableGradient, DeformableGradient, MaterialGradient, RigidBodyGradient, StepGradient,
+};
 use super::joint_solve::{Solved, solve};
 use super::loss::Seed;
 use super::parameters::{ElasticWork, Inertia};
 use super::record::{BodyRecord, StepRecord};
+use super::rigid_back::RigidBackward;
 use super::spin::{Cotangents, through_spin};
 use super::tangent::Tangent;
 use crate::body::DeformableCableHandle;
@@ -43,16 +46,21 @@ pub(super) struct Known {
 /// # Errors
 /// Why there is no gradient.
 pub(super) fn go_back(
-    bodies: &mut [Backward<'_>],
+    (bodies, rigid): (&mut [Backward<'_>], &mut [RigidBackward]),
     record: &StepRecord,
     seeds: &[&Seed],
-    out: &mut [DeformableGradient],
+    (out, out_rigid): (&mut [DeformableGradient], &mut [RigidBodyGradient]),
 ) -> Result<(), &'static str> {
     let mut known = Vec::with_capacity(bodies.len());
     for (k, body) in bodies.iter_mut().enumerate() {
         known.push(body.begin(&record.bodies[k], seeds[k], &mut out[k])?);
     }
-    let solved = solve(record, seeds, bodies, &mut known)?;
+    let known_rigid: Vec<_> =
+        rigid.iter().zip(&record.rigid_bodies).map(|(body, record)| body.begin(record)).collect();
+    let (solved, of_rigid) = solve(record, seeds, bodies, (&mut known, &known_rigid))?;
+    for (k, (known, of)) in known_rigid.iter().zip(of_rigid).enumerate() {
+        rigid[k].finish(&record.rigid_bodies[k], known, of, &mut out_rigid[k]);
+    }
     for (k, (known, solved)) in known.into_iter().zip(solved).enumerate() {
         bodies[k].finish(&record.bodies[k], known, &solved, &mut out[k]);
     }

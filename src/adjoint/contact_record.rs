@@ -1,5 +1,6 @@
-//! What is kept of a contact of a step: with a collider that does not yield, or between deformable bodies of the tape.
+//! What is kept of a contact of a step: with a collider that does not yield or whose rigid body is on the tape, or between deformable bodies of it.
 
+use super::collider_geometry::ColliderGeometry;
 use super::pair_geometry::PairGeometry;
 use super::record::NodeVectors;
 use crate::body::{ConstraintKey, DeformableBodyHandle};
@@ -7,6 +8,7 @@ use crate::contact::{Constraint, Endpoint, Law};
 use crate::fem::DeformableModel;
 use crate::math::Vec3;
 use crate::pipeline::SolvedContact;
+use rapier3d::dynamics::RigidBodyHandle;
 
 /// Part of the limit of friction from which on a contact slides.
 const SLIDES: f64 = 1.0 - 1.0e-6;
@@ -21,6 +23,26 @@ pub(super) struct TapeBody<'a> {
     /// Where its nodes would have gone without contact.
     pub targets: &'a [Vec3],
     pub x_end: &'a [Vec3],
+}
+
+/// A point of a rigid body of a tape.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RigidTouch {
+    /// Place of the body among the rigid ones of the tape.
+    pub place: usize,
+    /// Where what follows a node's three numbers for its linear and its angular motion, among those of all.
+    pub node: usize,
+    pub point: Vec3,
+    /// From its centre of mass at the start.
+    pub arm: Vec3,
+}
+
+/// The rigid bodies of a tape, and their centres of mass at the start of a step.
+pub(super) struct TapeRigid<'a> {
+    pub handles: &'a [RigidBodyHandle],
+    pub coms: &'a [Vec3],
+    /// Number of the nodes of all deformable bodies.
+    pub first_node: usize,
 }
 
 /// What a body touches.
@@ -51,8 +73,12 @@ pub(super) struct ContactRecord {
     pub slip: Option<Vec3>,
     /// An overlap that was not to be recovered altogether: where the node ends depends on where it began.
     pub recovers: bool,
+    /// Of a partner that yields.
+    pub rigid: Option<RigidTouch>,
     /// Of two bodies: what its normal and its weights depend on.
     pub geometry: Option<PairGeometry>,
+    /// The same of a body and a collider.
+    pub on_collider: Option<ColliderGeometry>,
 }
 
 /// Whether a constraint other than one of a cable has a force.
@@ -68,7 +94,7 @@ impl ContactRecord {
     pub fn new(
         contact: &SolvedContact<'_>,
         place: usize,
-        bodies: &[TapeBody<'_>],
+        (bodies, rigid): (&[TapeBody<'_>], &TapeRigid<'_>),
     ) -> Result<Option<Self>, &'static str> {
         let constraint = contact.constraint;
         let Law::Contact { friction } = constraint.law else {
@@ -78,7 +104,7 @@ impl ContactRecord {
             return Err("contacts that give way, and restitution, have none");
         }
         let partner = match (constraint.key, contact.bodies) {
-            (ConstraintKey::Obstacle(key), _) if contact.is_on_prescribed => Partner::Collider(key.collider),
+            (ConstraintKey::Obstacle(key), [Some(_), None]) => Partner::Collider(key.collider),
             (ConstraintKey::SoftPair(_), [Some(first), Some(_)]) if first != bodies[place].handle => {
                 let is_ours = bodies.iter().any(|body| body.handle == first);
                 return if is_ours { Ok(None) } else { Err(NOT_RECORDED) };
@@ -87,7 +113,11 @@ impl ContactRecord {
                 let found = bodies.iter().position(|body| body.handle == second);
                 Partner::Body(found.ok_or(NOT_RECORDED)?)
             }
-            _ => return Err("contacts with rigid bodies that yield have none"),
+            _ => return Err("contacts of this kind have none"),
+        };
+        let rigid = match partner {
+            Partner::Collider(_) if !contact.is_on_prescribed => Some(rigid.touch(contact)?),
+            _ => None,
         };
         let mut nodes = weighted_nodes(&constraint.endpoints[0], &bodies[place], 1.0);
         let geometry = match partner {
@@ -96,6 +126,10 @@ impl ContactRecord {
                 nodes.extend(weighted_nodes(&constraint.endpoints[1], &bodies[other], -1.0));
                 Some(PairGeometry::new(constraint, [&bodies[place], &bodies[other]])?)
             }
+        };
+        let on_collider = match partner {
+            Partner::Collider(_) => ColliderGeometry::new(contact, &bodies[place]),
+            Partner::Body(_) => None,
         };
         let slip = slip(contact, friction);
         Ok(Some(Self {
@@ -108,7 +142,9 @@ impl ContactRecord {
             motion: contact.motion,
             slip,
             recovers: constraint.target_gap != constraint.gap,
+            rigid,
             geometry,
+            on_collider,
         }))
     }
 
@@ -117,10 +153,10 @@ impl ContactRecord {
         if self.friction > 0.0 { 3 } else { 1 }
     }
 
-    /// The one node that it acts on, if it sticks.
+    /// The one node that it acts on, if it sticks to what does not yield.
     pub fn stuck_node(&self) -> Option<usize> {
         let [(node, _)] = self.nodes[..] else { return None };
-        (self.friction > 0.0 && self.slip.is_none()).then_some(node)
+        (self.rigid.is_none() && self.friction > 0.0 && self.slip.is_none()).then_some(node)
     }
 
     /// What its slip along a direction of the surface is asked for along: where it slid, only what turns the slip.
@@ -131,9 +167,32 @@ impl ContactRecord {
         }
     }
 
-    /// A vector on its nodes, by their weights.
+    /// A vector on its nodes, by their weights, and against it on the rigid body.
     pub fn laid(&self, vector: Vec3) -> NodeVectors {
-        self.nodes.iter().map(|(node, weight)| (*node, vector * *weight)).collect()
+        let soft = self.nodes.iter().map(|(node, weight)| (*node, vector * *weight));
+        let rigid = self.rigid.map(|at| [(at.node, -vector), (at.node + 1, -at.arm.cross(&vector))]);
+        soft.chain(rigid.into_iter().flatten()).collect()
+    }
+
+    /// What a field over all nodes is at the body against its partner.
+    pub fn relative(&self, field: &[Vec3]) -> Vec3 {
+        let soft = self.nodes.iter().fold(Vec3::zeros(), |sum, (node, weight)| sum + field[*node] * *weight);
+        let carried = |at: RigidTouch| field[at.node] + field[at.node + 1].cross(&at.arm);
+        soft - self.rigid.map_or(Vec3::zeros(), carried)
+    }
+}
+
+impl TapeRigid<'_> {
+    /// Where a contact touches one of them.
+    fn touch(&self, contact: &SolvedContact<'_>) -> Result<RigidTouch, &'static str> {
+        let own = |handle: &RigidBodyHandle| contact.rigid == Some(*handle);
+        let place = self.handles.iter().position(own);
+        let place = place.ok_or("contacts with rigid bodies that yield and are not on the tape have none")?;
+        let Endpoint::Rigid { point, .. } = contact.constraint.endpoints[1] else {
+            return Err("contacts of this kind have none");
+        };
+        let node = self.first_node + 2 * place;
+        Ok(RigidTouch { place, node, point, arm: point - self.coms[place] })
     }
 }
 

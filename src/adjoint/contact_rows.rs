@@ -10,9 +10,10 @@
 //! A node that sticks with its one contact moves by nothing but its partner: it is taken out of the unknowns as a pinned one is.
 //!
 //! With `C = ∂F₂/∂x′` and `D = ∂F₂/∂λ` the adjoint is `H z = g + Cᵀq`, `(J H⁻¹ Cᵀ + Dᵀ) q = −g_λ − J H⁻¹ g`. Normals and weights are
-//! those of the start of the step; between deformable bodies they depend on it (`src/adjoint/pair_geometry.rs`), with colliders they count as
-//! constant. Nodes are those of all bodies in one row.
+//! those of the start of the step, and depend on it (`src/adjoint/pair_geometry.rs`, `collider_geometry.rs`). Nodes are those of all bodies in one
+//! row, and after them two of each rigid body that yields: its linear motion, and its turn \[rad\].
 
+use super::collider_geometry::OfPlaces;
 use super::contact_record::{ContactRecord, Partner};
 use super::record::NodeVectors;
 use super::tangents::Tangents;
@@ -54,6 +55,8 @@ pub(super) struct ContactShare {
     pub of_start: Vec<Vec3>,
     /// Of where nodes would go without contact.
     pub of_targets: Vec<Vec3>,
+    /// Of where rigid bodies begin: their centres of mass, and turns about these.
+    pub of_rigid: Vec<[Vec3; 2]>,
     /// Of each contact's coefficient of friction.
     pub of_friction: Vec<(usize, Partner, f64)>,
     /// Of the lengths of cables.
@@ -101,17 +104,18 @@ impl<'a> ContactRows<'a> {
         self.of_forces[(place, place)] = compliance;
     }
 
-    /// Solves for z in place of `g`, zero at pinned nodes. `None` if it cannot be.
+    /// Solves for z in place of `g`, zero at pinned nodes, where rigid bodies turn so in the step. `None` if it cannot be.
     pub fn solve(
         &self,
         tangents: &mut Tangents<'_>,
-        is_free: &[bool],
+        (is_free, turns): (&[bool], &[Vec3]),
         g: &mut [Vec3],
     ) -> Option<ContactShare> {
         let (count, n) = (self.rows.len(), g.len());
         let mut share = ContactShare { of_end: vec![Vec3::zeros(); n], ..Default::default() };
         share.of_start = share.of_end.clone();
         share.of_targets = share.of_end.clone();
+        share.of_rigid = vec![[Vec3::zeros(); 2]; turns.len()];
         if count == 0 {
             return solve_one(tangents, g).then_some(share);
         }
@@ -146,12 +150,12 @@ impl<'a> ContactRows<'a> {
             *g += c;
         }
         solve_one(tangents, g).then_some(())?;
-        self.add_by_contact(g, q.as_slice(), &mut share);
+        self.add_by_contact((g, turns), q.as_slice(), &mut share);
         Some(share)
     }
 
     /// Adds what z and q say contact by contact: of friction, and of what normals and weights depend on.
-    fn add_by_contact(&self, z: &[Vec3], q: &[f64], share: &mut ContactShare) {
+    fn add_by_contact(&self, (z, turns): (&[Vec3], &[Vec3]), q: &[f64], share: &mut ContactShare) {
         let mut first = 0;
         for (contact, of_force) in &self.contacts {
             let own = first..first + contact.dimension();
@@ -161,7 +165,17 @@ impl<'a> ContactRows<'a> {
             share.of_friction.push((contact.body, contact.partner, of_friction.sum()));
             if let Some(geometry) = &contact.geometry {
                 let by = (&mut share.of_start[..], &mut share.of_targets[..]);
-                geometry.add_by_start(contact, (z, &q[own]), of_force, by);
+                geometry.add_by_start(contact, (z, &q[own.clone()]), of_force, by);
+            }
+            if let Some(geometry) = &contact.on_collider {
+                let mut of = OfPlaces::new(&mut share.of_start);
+                let turn = contact.rigid.map_or(Vec3::zeros(), |at| turns[at.place]);
+                geometry.add_by_start(contact, (z, &q[own]), (of_force, &turn), &mut of);
+                if let (Some(at), OfPlaces { com, turn, .. }) = (contact.rigid, of) {
+                    let [of_com, of_turn] = &mut share.of_rigid[at.place];
+                    *of_com += com;
+                    *of_turn += turn;
+                }
             }
         }
     }

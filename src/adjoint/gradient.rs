@@ -2,6 +2,7 @@
 
 use crate::body::DeformableCableHandle;
 use crate::material::MAX_BRANCHES;
+use rapier3d::dynamics::RigidBodyHandle;
 
 /// Derivatives of a loss with respect to the material of a region.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -94,6 +95,71 @@ pub struct StepGradient {
     pub velocities: Vec<[f64; 3]>,
 }
 
+/// Derivatives of a loss with respect to what acted on a rigid body in one step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct RigidStepGradient {
+    /// Per newton at its centre of mass.
+    pub force: [f64; 3],
+    /// Per newton metre.
+    pub torque: [f64; 3],
+    /// Per m/s² of the world's gravity, as far as this body feels it.
+    pub gravity: [f64; 3],
+    /// Per m/s that it would have gained before the step.
+    pub linvel: [f64; 3],
+    /// Per rad/s that it would have gained before the step.
+    pub angvel: [f64; 3],
+}
+
+/// Derivatives of a loss with respect to a rigid body ([`DeformableTape::with_rigid_bodies`](crate::DeformableTape::with_rigid_bodies)).
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct RigidBodyGradient {
+    /// The body.
+    pub body: RigidBodyHandle,
+    /// Per metre of where it began.
+    pub initial_position: [f64; 3],
+    /// Per radian that it was turned by at first, about axes of the world through its centre of mass.
+    pub initial_rotation: [f64; 3],
+    /// Per m/s with which its centre of mass began.
+    pub initial_linvel: [f64; 3],
+    /// Per rad/s with which it began.
+    pub initial_angvel: [f64; 3],
+    /// Per kilogram, with the inertia in proportion.
+    pub mass: f64,
+    /// Step by step.
+    pub steps: Vec<RigidStepGradient>,
+}
+
+impl RigidBodyGradient {
+    pub(super) fn of(body: RigidBodyHandle) -> Self {
+        Self {
+            body,
+            initial_position: [0.0; 3],
+            initial_rotation: [0.0; 3],
+            initial_linvel: [0.0; 3],
+            initial_angvel: [0.0; 3],
+            mass: 0.0,
+            steps: Vec::new(),
+        }
+    }
+
+    /// Per m/s² of a gravity that was the same in all steps, as far as this body feels it.
+    pub fn gravity(&self) -> [f64; 3] {
+        self.steps.iter().fold([0.0; 3], |sum, step| added(&sum, &step.gravity))
+    }
+
+    /// Per newton of a force at its centre of mass that was the same in all steps.
+    pub fn force(&self) -> [f64; 3] {
+        self.steps.iter().fold([0.0; 3], |sum, step| added(&sum, &step.force))
+    }
+
+    /// Per newton metre of a torque that was the same in all steps.
+    pub fn torque(&self) -> [f64; 3] {
+        self.steps.iter().fold([0.0; 3], |sum, step| added(&sum, &step.torque))
+    }
+}
+
 /// Derivatives of a loss, of [`DeformableTape::backward`](crate::DeformableTape::backward).
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -108,6 +174,8 @@ pub struct DeformableGradient {
     pub friction: f64,
     /// Step by step.
     pub steps: Vec<StepGradient>,
+    /// Of the rigid bodies of the tape, in their order; of a tape of several deformable ones they are with the first.
+    pub rigid_bodies: Vec<RigidBodyGradient>,
 }
 
 impl DeformableGradient {

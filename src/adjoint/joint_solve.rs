@@ -1,4 +1,4 @@
-//! The adjoint of a step of bodies that touch: that of each is its own Hessian's, and contacts are between them.
+//! The adjoint of a step of bodies that touch: that of each is its own Hessian's, that of rigid ones their mass's, and contacts are between them.
 
 use super::backward::{Backward, Known};
 use super::cables::{OfCable, along};
@@ -6,6 +6,8 @@ use super::contact_record::{ContactRecord, Partner};
 use super::contact_rows::{ContactRows, ContactShare};
 use super::loss::Seed;
 use super::record::{BodyRecord, StepRecord};
+use super::rigid_back::RigidKnown;
+use super::rigid_record::RigidRecord;
 use super::tangents::Tangents;
 use crate::math::Vec3;
 use std::ops::Range;
@@ -29,7 +31,10 @@ struct Joint<'a> {
     others: Vec<&'a ContactRecord>,
 }
 
-/// Solves for the adjoint of every body; adds what contacts say of the start, and of friction.
+/// What contacts say of the motion and the turn of a rigid body, and of its place and its turn at the start.
+pub(super) type OfRigid = ([Vec3; 2], [Vec3; 2]);
+
+/// Solves for the adjoint of every body; adds what contacts say of the start, and of friction. Gives what they say of rigid bodies too.
 ///
 /// # Errors
 /// Why there is no gradient.
@@ -37,10 +42,13 @@ pub(super) fn solve(
     record: &StepRecord,
     seeds: &[&Seed],
     bodies: &mut [Backward<'_>],
-    known: &mut [Known],
-) -> Result<Vec<Solved>, &'static str> {
+    (known, rigid): (&mut [Known], &[RigidKnown]),
+) -> Result<(Vec<Solved>, Vec<OfRigid>), &'static str> {
     let joint = Joint::new(record, seeds);
     let mut g: Vec<Vec3> = known.iter_mut().flat_map(|known| std::mem::take(&mut known.g)).collect();
+    let deformable = g.len();
+    g.extend(rigid.iter().zip(&record.rigid_bodies).flat_map(|(known, record)| known.g(record)));
+    let turns: Vec<Vec3> = record.rigid_bodies.iter().map(RigidRecord::turn).collect();
     let (mut is_free, mut of_fixed) = (vec![true; g.len()], vec![Vec3::zeros(); g.len()]);
     let fixed = joint.fixed();
     for &node in &fixed {
@@ -53,13 +61,15 @@ pub(super) fn solve(
         z_stuck[*node] = -joint.of_contact(contact);
     }
     tangents.take_off_free(&z_stuck, &is_free, &mut g);
-    let share = joint.rows(known, &z_stuck).solve(&mut tangents, &is_free, &mut g);
+    let share = joint.rows(known, &z_stuck).solve(&mut tangents, (&is_free, &turns), &mut g);
     let (mut share, mut z) = (share.ok_or("its contacts say too little or too much")?, g);
     joint.stuck.iter().for_each(|(node, _)| z[*node] = z_stuck[*node]);
     tangents.take_off_pinned(&z, &mut of_fixed);
+    let motions = share.of_end[deformable..].chunks_exact(2).map(|of| [of[0], of[1]]);
+    let of_rigid = motions.zip(share.of_rigid.iter().copied()).collect();
     of_fixed.iter_mut().zip(&share.of_end).for_each(|(of, c)| *of += c);
     joint.add_by_stuck(known, &z, &of_fixed, &mut share.of_start);
-    Ok(joint.split(known, &share, &z, &of_fixed))
+    Ok((joint.split(known, &share, &z, &of_fixed), of_rigid))
 }
 
 impl<'a> Joint<'a> {
@@ -109,7 +119,8 @@ impl<'a> Joint<'a> {
             }
             each.push((&mut body.tangent, nodes.clone()));
         }
-        Ok(Tangents::new(each))
+        let rigid = self.record.rigid_bodies.iter().flat_map(RigidRecord::responses);
+        Ok(Tangents::new(each, rigid.collect()))
     }
 
     /// What the loss says of the force of a contact.

@@ -5,6 +5,8 @@ use crate::coupling::packed;
 use crate::error::BodyError;
 use crate::fem::DeformableModel;
 use crate::math::Vec3;
+use super::rigid_flight::OfState;
+use rapier3d::dynamics::RigidBodyHandle;
 use rapier3d::geometry::ColliderHandle;
 use std::sync::Arc;
 
@@ -15,6 +17,7 @@ pub struct DeformableLoss {
     /// The bodies of the tape, and the place among them of the one that it is of.
     pub(super) bodies: Arc<[DeformableBodyHandle]>,
     pub(super) place: usize,
+    pub(super) rigid_bodies: Arc<[RigidBodyHandle]>,
     pub(super) model: Arc<DeformableModel>,
     pub(super) seeds: Vec<Seed>,
 }
@@ -31,6 +34,8 @@ pub(super) struct Seed {
     pub body_forces: Vec<(usize, Vec3)>,
     /// Of the tensions of cables.
     pub tensions: Vec<(DeformableCableHandle, f64)>,
+    /// Of rigid bodies, by their places.
+    pub rigid: Vec<(usize, OfState)>,
 }
 
 impl Seed {
@@ -52,12 +57,12 @@ fn sum_of<K: Copy + PartialEq>(derivatives: &[(K, Vec3)], of: K) -> Vec3 {
 impl DeformableLoss {
     /// Of the body at a place of a tape's bodies.
     pub(super) fn new(
-        bodies: Arc<[DeformableBodyHandle]>,
-        place: usize,
+        (bodies, place): (Arc<[DeformableBodyHandle]>, usize),
+        rigid_bodies: Arc<[RigidBodyHandle]>,
         model: Arc<DeformableModel>,
         steps: usize,
     ) -> Self {
-        Self { bodies, place, model, seeds: vec![Seed::default(); steps] }
+        Self { bodies, place, rigid_bodies, model, seeds: vec![Seed::default(); steps] }
     }
 
     /// The body that it is of.
@@ -140,6 +145,67 @@ impl DeformableLoss {
         derivative: f64,
     ) -> Result<(), BodyError> {
         self.seed(step)?.tensions.push((cable, derivative));
+        Ok(())
+    }
+
+    /// Adds the derivative with respect to the place of the centre of mass of a rigid body of the tape at the end of a step, per metre. Which of the losses
+    /// has it does not matter.
+    ///
+    /// # Errors
+    /// [`BodyError::NoGradient`] if the tape has no such step, or is not of that body too.
+    pub fn add_rigid_position(
+        &mut self,
+        step: usize,
+        body: RigidBodyHandle,
+        derivative: [f64; 3],
+    ) -> Result<(), BodyError> {
+        self.add_rigid(step, body, OfState { com: derivative.into(), ..OfState::default() })
+    }
+
+    /// Adds the derivative with respect to a turn of a rigid body of the tape about axes of the world, at the end of a step, per radian.
+    ///
+    /// # Errors
+    /// As [`DeformableLoss::add_rigid_position`].
+    pub fn add_rigid_rotation(
+        &mut self,
+        step: usize,
+        body: RigidBodyHandle,
+        derivative: [f64; 3],
+    ) -> Result<(), BodyError> {
+        self.add_rigid(step, body, OfState { turn: derivative.into(), ..OfState::default() })
+    }
+
+    /// Adds the derivative with respect to the velocity of the centre of mass of a rigid body of the tape at the end of a step, per m/s.
+    ///
+    /// # Errors
+    /// As [`DeformableLoss::add_rigid_position`].
+    pub fn add_rigid_linvel(
+        &mut self,
+        step: usize,
+        body: RigidBodyHandle,
+        derivative: [f64; 3],
+    ) -> Result<(), BodyError> {
+        self.add_rigid(step, body, OfState { linvel: derivative.into(), ..OfState::default() })
+    }
+
+    /// Adds the derivative with respect to the angular velocity of a rigid body of the tape at the end of a step, per rad/s.
+    ///
+    /// # Errors
+    /// As [`DeformableLoss::add_rigid_position`].
+    pub fn add_rigid_angvel(
+        &mut self,
+        step: usize,
+        body: RigidBodyHandle,
+        derivative: [f64; 3],
+    ) -> Result<(), BodyError> {
+        self.add_rigid(step, body, OfState { angvel: derivative.into(), ..OfState::default() })
+    }
+
+    fn add_rigid(&mut self, step: usize, body: RigidBodyHandle, of: OfState) -> Result<(), BodyError> {
+        let place = self.rigid_bodies.iter().position(|own| *own == body);
+        let what = "the rigid body that the loss is of is not on the tape: see `with_rigid_bodies`";
+        let place = place.ok_or(BodyError::NoGradient { step, what })?;
+        self.seed(step)?.rigid.push((place, of));
         Ok(())
     }
 

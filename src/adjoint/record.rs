@@ -1,8 +1,9 @@
 //! What is kept of a step so that it can be gone through backward, and which steps cannot be. Of contacts see `contact_record.rs`.
 
 use super::cables::{CableRecord, cables_of};
-use super::contact_record::{ContactRecord, TapeBody, carries};
+use super::contact_record::{ContactRecord, TapeBody, TapeRigid, carries};
 use super::held_twists::TwistRecord;
+use super::rigid_record::{RigidRecord, RigidStart};
 use super::wind::WindRecord;
 use crate::body::{DeformableBody, DeformableBodyHandle, DeformableWind, HeldTwist, Integrator, Solver};
 use crate::energy::CavityFilling;
@@ -10,7 +11,7 @@ use crate::fem::{DampedStep, Dampers, DeformableModel, Elements, StiffnessDampin
 use crate::material::DeformableMaterial;
 use crate::math::Vec3;
 use crate::pipeline::{DeformableWorld, SolvedBody, SolvedContact};
-use rapier3d::dynamics::RigidBodyType;
+use rapier3d::dynamics::{RigidBodyHandle, RigidBodyType};
 use rapier3d::pipeline::PhysicsWorld;
 use std::ops::Range;
 use std::sync::Arc;
@@ -32,6 +33,7 @@ pub(super) type NodeVectors = Vec<(usize, Vec3)>;
 pub(super) struct StepRecord {
     pub bodies: Vec<BodyRecord>,
     pub contacts: Vec<ContactRecord>,
+    pub rigid_bodies: Vec<RigidRecord>,
 }
 
 /// A step of one body.
@@ -109,14 +111,14 @@ impl BodyRecord {
 }
 
 impl StepRecord {
-    /// Of the last step of these bodies, under this gravity [m/s²].
+    /// Of the last step of these bodies, under this gravity [m/s²], which the rigid ones began so.
     ///
     /// # Errors
     /// Why there is no gradient.
     pub fn new(
         (handles, models): (&[DeformableBodyHandle], &[Arc<DeformableModel>]),
         (physics, deformables): (&PhysicsWorld, &DeformableWorld),
-        gravity: Vec3,
+        (gravity, rigid_handles, starts): (Vec3, &[RigidBodyHandle], &[RigidStart]),
     ) -> Result<Self, &'static str> {
         let mut bodies = Vec::with_capacity(handles.len());
         let mut solved = Vec::with_capacity(handles.len());
@@ -127,7 +129,7 @@ impl StepRecord {
             bodies.push(BodyRecord::new(&deformables.bodies[*handle], &own, cables, gravity)?);
             solved.push(own);
         }
-        let mut record = Self { bodies, contacts: Vec::new() };
+        let mut record = Self { bodies, contacts: Vec::new(), rigid_bodies: Vec::new() };
         let places = record.nodes();
         let tape_body = |place: usize| TapeBody {
             handle: handles[place],
@@ -138,14 +140,29 @@ impl StepRecord {
             x_end: &record.bodies[place].x_end,
         };
         let tape_bodies: Vec<_> = (0..handles.len()).map(tape_body).collect();
+        let coms: Vec<Vec3> = starts.iter().map(RigidStart::com).collect();
+        let first_node = places.last().map_or(0, |last| last.end);
+        let rigid = TapeRigid { handles: rigid_handles, coms: &coms, first_node };
         let mut contacts = Vec::new();
         for (place, own) in solved.iter().enumerate() {
             for contact in own.contacts.iter().filter(carries) {
-                contacts.extend(ContactRecord::new(contact, place, &tape_bodies)?);
+                contacts.extend(ContactRecord::new(contact, place, (&tape_bodies, &rigid))?);
             }
         }
-        record.contacts = contacts;
+        let mut rigid_bodies = Vec::with_capacity(starts.len());
+        for (place, own) in rigid_handles.iter().copied().zip(starts).enumerate() {
+            let is_own = |contact: &&ContactRecord| contact.rigid.is_some_and(|at| at.place == place);
+            let on_it = contacts.iter().filter(is_own);
+            rigid_bodies.push(RigidRecord::new(own, (physics, deformables), on_it)?);
+        }
+        (record.contacts, record.rigid_bodies) = (contacts, rigid_bodies);
         Ok(record)
+    }
+
+    /// Where it has led the bodies.
+    pub fn led_to(&self) -> Vec<Vec3> {
+        let nodes = self.bodies.iter().flat_map(|body| body.x_end.iter().copied());
+        nodes.chain(self.rigid_bodies.iter().map(|body| body.end.com)).collect()
     }
 
     /// Of each body its nodes among those of all.

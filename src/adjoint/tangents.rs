@@ -1,25 +1,33 @@
-//! The Hessians of all bodies of a step as one, whose nodes are in one row.
+//! The Hessians of all bodies of a step as one, whose nodes are in one row, and after them the masses over h² of the rigid ones.
 
 use super::tangent::Tangent;
-use crate::math::Vec3;
+use crate::math::{Mat3, Vec3};
 use std::ops::Range;
 
 /// Of each body its Hessian, and which of the nodes are its.
 pub(super) struct Tangents<'a> {
     each: Vec<(&'a mut Tangent, Range<usize>)>,
+    /// Of rigid bodies, inverse: of their linear motions and turns in turn.
+    rigid: Vec<Mat3>,
 }
 
 impl<'a> Tangents<'a> {
-    pub fn new(each: Vec<(&'a mut Tangent, Range<usize>)>) -> Self {
-        Self { each }
+    pub fn new(each: Vec<(&'a mut Tangent, Range<usize>)>, rigid: Vec<Mat3>) -> Self {
+        Self { each, rigid }
     }
 
     /// As [`Tangent::solve`], of columns over all nodes.
     pub fn solve(&mut self, columns: &mut [f64]) -> bool {
-        if let [(tangent, _)] = &mut self.each[..] {
+        if let ([(tangent, _)], []) = (&mut self.each[..], &self.rigid[..]) {
             return tangent.solve(columns);
         }
-        let count = self.each.last().map_or(0, |(_, nodes)| 3 * nodes.end);
+        let deformable = self.each.last().map_or(0, |(_, nodes)| 3 * nodes.end);
+        let count = deformable + 3 * self.rigid.len();
+        for column in columns.chunks_exact_mut(count) {
+            for (motion, inverse) in column[deformable..].chunks_exact_mut(3).zip(&self.rigid) {
+                motion.copy_from_slice((inverse * Vec3::from_column_slice(motion)).as_slice());
+            }
+        }
         let mut own = Vec::new();
         self.each.iter_mut().all(|(tangent, nodes)| {
             let part = 3 * nodes.start..3 * nodes.end;

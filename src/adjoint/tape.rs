@@ -4,12 +4,14 @@ use super::checkpoint::Checkpoint;
 use super::contact_record::Partner;
 use super::loss::DeformableLoss;
 use super::record::StepRecord;
+use super::rigid_record::{NOT_FREE, RigidStart};
 use crate::body::DeformableBodyHandle;
 use crate::coupling::packed;
 use crate::error::{BodyError, DeformableBodyError};
 use crate::fem::DeformableModel;
 use crate::math::{Vec3, from_real};
 use crate::pipeline::DeformableWorld;
+use rapier3d::dynamics::RigidBodyHandle;
 use rapier3d::geometry::ColliderHandle;
 use rapier3d::pipeline::PhysicsWorld;
 use std::fmt;
@@ -63,6 +65,7 @@ use std::sync::Arc;
 pub struct DeformableTape {
     pub(super) bodies: Arc<[DeformableBodyHandle]>,
     pub(super) models: Vec<Arc<DeformableModel>>,
+    pub(super) rigid_bodies: Arc<[RigidBodyHandle]>,
     /// Those that are kept: all, or with checkpoints those since the last one.
     pub(super) steps: Vec<StepRecord>,
     /// Steps that are not kept.
@@ -112,12 +115,40 @@ impl DeformableTape {
         Ok(Self {
             bodies: bodies.into(),
             models: bodies.iter().map(model).collect::<Result<_, DeformableBodyError>>()?,
+            rigid_bodies: Arc::new([]),
             steps: Vec::new(),
             forgotten: 0,
             checkpoint_every: None,
             checkpoints: Vec::new(),
             is_interrupted: false,
         })
+    }
+
+    /// The tape, of rigid bodies too: dynamic ones that the deformable bodies of the tape touch, and nothing else does. A tape that has some has to
+    /// take its steps by itself ([`DeformableTape::step`]); what their user does to them between steps takes part, as with the deformable ones.
+    /// Losses may be of them ([`DeformableLoss::add_rigid_position`]), and gradients are with respect to them
+    /// ([`DeformableGradient::rigid_bodies`](crate::DeformableGradient::rigid_bodies)). Steps that were recorded before are forgotten.
+    ///
+    /// # Errors
+    /// [`BodyError::NoGradient`] if one is named twice, is not there, not dynamic, not enabled, or part of a multibody.
+    pub fn with_rigid_bodies(
+        mut self,
+        physics: &PhysicsWorld,
+        bodies: &[RigidBodyHandle],
+    ) -> Result<Self, DeformableBodyError> {
+        let none = |what| BodyError::NoGradient { step: 0, what };
+        if bodies.iter().enumerate().any(|(k, body)| bodies[..k].contains(body)) {
+            return Err(none("the tape names a rigid body twice").into());
+        }
+        self.rigid_bodies = bodies.into();
+        self.starts(physics).map_err(none)?;
+        self.clear();
+        Ok(self)
+    }
+
+    /// The rigid bodies, in the order in which they were named.
+    pub fn rigid_bodies(&self) -> &[RigidBodyHandle] {
+        &self.rigid_bodies
     }
 
     /// The bodies, in the order in which they were named.
@@ -163,8 +194,10 @@ impl DeformableTape {
             self.checkpoint_every.is_some_and(|every| self.is_interrupted || step.is_multiple_of(every));
         let checkpoint = is_due.then(|| Checkpoint::new(step, &self.led_to(step), physics, deformables));
         let gravity = from_real(physics.gravity);
+        let starts = self.starts(physics);
         take(physics, deformables);
-        let record = self.record_of(physics, deformables, gravity);
+        let starts = starts.map_err(|what| BodyError::NoGradient { step, what }.into());
+        let record = starts.and_then(|starts| self.record_of(physics, deformables, (gravity, &starts)));
         self.is_interrupted = record.is_err();
         let record = record?;
         if let Some(checkpoint) = checkpoint {
@@ -180,7 +213,7 @@ impl DeformableTape {
     pub(super) fn led_to(&self, step: usize) -> Vec<Vec3> {
         let kept = step.checked_sub(self.forgotten + 1).and_then(|place| self.steps.get(place));
         let checkpoint = || self.checkpoints.iter().find(|checkpoint| checkpoint.step == step);
-        kept.map(|record| record.bodies.iter().flat_map(|body| body.x_end.iter().copied()).collect())
+        kept.map(StepRecord::led_to)
             .or_else(|| checkpoint().map(|checkpoint| checkpoint.led_to.clone()))
             .unwrap_or_default()
     }
@@ -194,11 +227,11 @@ impl DeformableTape {
         physics: &PhysicsWorld,
         deformables: &DeformableWorld,
     ) -> Result<(), DeformableBodyError> {
-        if self.checkpoint_every.is_some() {
-            let what = "with checkpoints a tape has to take its steps by itself";
+        if self.checkpoint_every.is_some() || !self.rigid_bodies.is_empty() {
+            let what = "with checkpoints or rigid bodies a tape has to take its steps by itself";
             return Err(BodyError::NoGradient { step: self.len(), what }.into());
         }
-        let record = self.record_of(physics, deformables, from_real(physics.gravity))?;
+        let record = self.record_of(physics, deformables, (from_real(physics.gravity), &[]))?;
         self.steps.push(record);
         Ok(())
     }
@@ -207,14 +240,21 @@ impl DeformableTape {
         &self,
         physics: &PhysicsWorld,
         deformables: &DeformableWorld,
-        gravity: Vec3,
+        (gravity, starts): (Vec3, &[RigidStart]),
     ) -> Result<StepRecord, DeformableBodyError> {
         let step = self.len();
         for body in self.bodies.iter() {
             deformables.bodies.get(*body).ok_or_else(|| body.no_such_body())?;
         }
-        let record = StepRecord::new((&self.bodies, &self.models), (physics, deformables), gravity);
+        let began = (gravity, &self.rigid_bodies[..], starts);
+        let record = StepRecord::new((&self.bodies, &self.models), (physics, deformables), began);
         Ok(record.map_err(|what| BodyError::NoGradient { step, what })?)
+    }
+
+    /// Of the rigid bodies before a step.
+    fn starts(&self, physics: &PhysicsWorld) -> Result<Vec<RigidStart>, &'static str> {
+        let start = |body: &RigidBodyHandle| RigidStart::of(physics, *body).ok_or(NOT_FREE);
+        self.rigid_bodies.iter().map(start).collect()
     }
 
     /// Number of steps.
@@ -292,6 +332,7 @@ impl DeformableTape {
     }
 
     fn loss_at(&self, place: usize) -> DeformableLoss {
-        DeformableLoss::new(self.bodies.clone(), place, self.models[place].clone(), self.len())
+        let bodies = (self.bodies.clone(), place);
+        DeformableLoss::new(bodies, self.rigid_bodies.clone(), self.models[place].clone(), self.len())
     }
 }

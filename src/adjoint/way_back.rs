@@ -1,8 +1,10 @@
 //! The way back over the steps of a tape, from what was kept of them or from checkpoints.
 
 use super::backward::{Backward, go_back};
-use super::gradient::{DeformableGradient, MaterialGradient};
-use super::loss::DeformableLoss;
+use super::rigid_back::RigidBackward;
+use super::gradient::{DeformableGradient, MaterialGradient, RigidBodyGradient};
+use super::loss::{DeformableLoss, Seed};
+use super::record::StepRecord;
 use super::tape::DeformableTape;
 use crate::error::{BodyError, DeformableBodyError};
 use crate::fem::DeformableModel;
@@ -14,6 +16,14 @@ use std::sync::Arc;
 /// Mean edges by which a replay may end elsewhere: what is left of recorded steps, where these have not the same bits. Other steps are off by
 /// their motion.
 const ELSEWHERE: f64 = 1.0e-6;
+
+/// What goes backward, and what has come of that.
+struct WayBack<'a> {
+    bodies: Vec<Backward<'a>>,
+    rigid: Vec<RigidBackward>,
+    gradients: Vec<DeformableGradient>,
+    of_rigid: Vec<RigidBodyGradient>,
+}
 
 impl DeformableTape {
     /// The derivatives of a loss of a tape of one body.
@@ -34,10 +44,9 @@ impl DeformableTape {
             let what = "it is not kept: with checkpoints a tape is replayed";
             return Err(BodyError::NoGradient { step: 0, what });
         }
-        let mut gradients = self.begin(losses)?;
-        let mut back = self.back()?;
-        self.go_back(0, losses, &mut back, &mut gradients)?;
-        Ok(finish(&back, gradients))
+        let mut back = self.begin(losses)?;
+        self.go_back(0, losses, &mut back)?;
+        Ok(back.finish())
     }
 
     /// As [`DeformableTape::backward`], from checkpoints: the steps between them are taken again, on copies of the worlds.
@@ -80,12 +89,12 @@ impl DeformableTape {
         if self.checkpoints.is_empty() {
             return Ok(self.backward_all(losses)?);
         }
-        let mut gradients = self.begin(losses)?;
-        let mut back = self.back()?;
+        let mut back = self.begin(losses)?;
         let mut end = self.len();
         for checkpoint in self.checkpoints.iter().rev() {
             let (mut physics, mut deformables) = checkpoint.worlds();
             let mut part = Self::of_bodies(&deformables, &self.bodies)?;
+            part.rigid_bodies = self.rigid_bodies.clone();
             // Its steps have the numbers of these, in errors too.
             part.forgotten = checkpoint.step;
             for step in checkpoint.step..end {
@@ -96,10 +105,10 @@ impl DeformableTape {
                 part.step_by(&mut physics, &mut deformables, &mut take)?;
             }
             self.check_replay(end, &part.led_to(part.len()))?;
-            part.go_back(checkpoint.step, losses, &mut back, &mut gradients)?;
+            part.go_back(checkpoint.step, losses, &mut back)?;
             end = checkpoint.step;
         }
-        Ok(finish(&back, gradients))
+        Ok(back.finish())
     }
 
     /// Whether a replay has led where the steps before one did.
@@ -113,7 +122,7 @@ impl DeformableTape {
         Ok(())
     }
 
-    fn begin(&self, losses: &[DeformableLoss]) -> Result<Vec<DeformableGradient>, BodyError> {
+    fn begin(&self, losses: &[DeformableLoss]) -> Result<WayBack<'_>, BodyError> {
         let step = self.len();
         if losses.len() != self.bodies.len() {
             let what = "a tape of several bodies has a loss of each: see `losses` and `backward_all`";
@@ -121,6 +130,7 @@ impl DeformableTape {
         }
         let is_ours = |(place, loss): (usize, &DeformableLoss)| {
             let is_like = loss.model.rest.len() == self.models[place].rest.len();
+            let is_like = is_like && loss.rigid_bodies == self.rigid_bodies;
             loss.bodies == self.bodies && is_like && loss.place == place && loss.seeds.len() == step
         };
         if !losses.iter().enumerate().all(is_ours) {
@@ -131,13 +141,14 @@ impl DeformableTape {
             let materials = vec![MaterialGradient::default(); model.regions().len()];
             DeformableGradient { materials, ..Default::default() }
         };
-        Ok(self.models.iter().map(none).collect())
-    }
-
-    fn back(&self) -> Result<Vec<Backward<'_>>, BodyError> {
         let what = "its stiffness has no inverse";
-        let back = self.models.iter().map(|model| Backward::new(model));
-        back.collect::<Option<_>>().ok_or(BodyError::NoGradient { step: 0, what })
+        let bodies = self.models.iter().map(|model| Backward::new(model));
+        Ok(WayBack {
+            bodies: bodies.collect::<Option<_>>().ok_or(BodyError::NoGradient { step: 0, what })?,
+            rigid: vec![RigidBackward::default(); self.rigid_bodies.len()],
+            gradients: self.models.iter().map(none).collect(),
+            of_rigid: self.rigid_bodies.iter().copied().map(RigidBodyGradient::of).collect(),
+        })
     }
 
     /// Through the steps that are kept, of which the first is that of this number of the losses.
@@ -145,18 +156,12 @@ impl DeformableTape {
         &self,
         first: usize,
         losses: &[DeformableLoss],
-        back: &mut [Backward<'_>],
-        gradients: &mut [DeformableGradient],
+        back: &mut WayBack<'_>,
     ) -> Result<(), BodyError> {
         for (step, record) in self.steps.iter().enumerate().rev() {
             let step = first + step;
             let seeds: Vec<_> = losses.iter().map(|loss| &loss.seeds[step]).collect();
-            for (back, seed) in back.iter_mut().zip(&seeds) {
-                seed.positions.iter().for_each(|(node, derivative)| back.x[*node] += derivative);
-                seed.velocities.iter().for_each(|(node, derivative)| back.v[*node] += derivative);
-            }
-            let none = |what| BodyError::NoGradient { step, what };
-            go_back(back, record, &seeds, gradients).map_err(none)?;
+            back.take(record, &seeds).map_err(|what| BodyError::NoGradient { step, what })?;
         }
         Ok(())
     }
@@ -167,12 +172,29 @@ fn one(gradients: Vec<DeformableGradient>) -> DeformableGradient {
     gradients.into_iter().next().unwrap_or_default()
 }
 
-fn finish(back: &[Backward<'_>], mut gradients: Vec<DeformableGradient>) -> Vec<DeformableGradient> {
-    for (back, gradient) in back.iter().zip(&mut gradients) {
-        let users = |nodes: &[Vec3]| back.model.nodes_by_vertex().map(|n| nodes[n].into()).collect();
-        gradient.steps.reverse();
-        gradient.initial_positions = users(&back.x);
-        gradient.initial_velocities = users(&back.v);
+impl WayBack<'_> {
+    /// Through one step.
+    fn take(&mut self, record: &StepRecord, seeds: &[&Seed]) -> Result<(), &'static str> {
+        for (back, seed) in self.bodies.iter_mut().zip(seeds) {
+            seed.positions.iter().for_each(|(node, derivative)| back.x[*node] += derivative);
+            seed.velocities.iter().for_each(|(node, derivative)| back.v[*node] += derivative);
+        }
+        self.rigid.iter_mut().enumerate().for_each(|(place, back)| back.add_seeds(seeds, place));
+        let out = (&mut self.gradients[..], &mut self.of_rigid[..]);
+        go_back((&mut self.bodies, &mut self.rigid), record, seeds, out)
     }
-    gradients
+
+    fn finish(mut self) -> Vec<DeformableGradient> {
+        for (back, gradient) in self.bodies.iter().zip(&mut self.gradients) {
+            let users = |nodes: &[Vec3]| back.model.nodes_by_vertex().map(|n| nodes[n].into()).collect();
+            gradient.steps.reverse();
+            gradient.initial_positions = users(&back.x);
+            gradient.initial_velocities = users(&back.v);
+        }
+        self.rigid.iter().zip(&mut self.of_rigid).for_each(|(back, gradient)| back.end(gradient));
+        if let Some(first) = self.gradients.first_mut() {
+            first.rigid_bodies = self.of_rigid;
+        }
+        self.gradients
+    }
 }

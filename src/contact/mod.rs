@@ -5,6 +5,7 @@
 
 mod shape_table;
 
+mod curvature;
 mod obstacle;
 
 mod constraint;
@@ -48,6 +49,7 @@ mod drag;
 pub(crate) use box_tree::BoxTree;
 pub(crate) use candidates::Candidates;
 pub(crate) use constraint::{Constraint, Endpoint, Law, PathPoint};
+pub(crate) use curvature::{box_edge_at, curvature};
 pub(crate) use detection::{Detector, STATIC_MARGIN};
 pub use drag::DeformableDrag;
 pub(crate) use meeting::{Closing, edges_closing, places_at, triangle_closing, weights_at};
@@ -60,4 +62,5 @@ pub(crate) use soft_contact::SoftDetector;
 pub(crate) use soft_surface::{SoftPair, SoftSurface};
 pub(crate) use speculative::{SpeculativePoint, placed, speculative_points};
 pub(crate) use surface_tree::SurfaceTree;
+pub(crate) use triangle_contact::{barycentric, normal_of};
 pub(crate) use tunnelling_stop::{Stop, comes_near, stop};

@@ -9,6 +9,7 @@ mod parts;
 
 mod coefficients;
 mod mass_properties;
+mod rigid_state;
 
 mod passive_joints;
 
@@ -51,5 +52,6 @@ pub use parts::PhysicsParts;
 pub(crate) use parts::{RapierSets, StepContext, body_handle, collider_handle, impulse_joint_handle, packed};
 pub use query_colliders::DeformableColliders;
 pub(crate) use reactions::Reactions;
+pub(crate) use rigid_state::{RigidLoad, RigidState, free_rigid_body};
 pub(crate) use scene::RapierScene;
 pub(crate) use twists::{note_twist, place_twists, twist_constraints};

@@ -9,7 +9,8 @@ use crate::body::{
 };
 use crate::coupling::{DeformableHooks, PhysicsParts};
 use crate::error::DeformableBodyError;
-use crate::solver::{FactorKey, SECOND_ORDER, alpha_step};
+use crate::solver::{FactorKey, Reaction, SECOND_ORDER, alpha_step};
+use rapier3d::dynamics::RigidBodyHandle;
 use rapier3d::geometry::ColliderSet;
 use std::fmt;
 
@@ -161,6 +162,11 @@ impl DeformablePipeline {
     /// Forces of the joints that the last step solved, axis by axis.
     pub fn joint_forces(&self) -> &[JointForce] {
         &self.scratch.joint_forces
+    }
+
+    /// What the last step has done to a rigid body; `None` of one that no deformable body has met.
+    pub(crate) fn reaction_on(&self, body: RigidBodyHandle) -> Option<Reaction> {
+        self.scratch.reaction_on(body)
     }
 
     /// What the last step has solved of a body; `None` if it was not stepped.

@@ -14,3 +14,4 @@ mod of_thin_damping;
 mod of_twist;
 mod of_weave;
 mod of_wind;
+mod on_rigid_bodies;

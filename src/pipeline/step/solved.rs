@@ -1,10 +1,11 @@
 //! What the last step has solved of one body, for what asks afterwards how it came about.
 
 use super::scratch::StepScratch;
-use crate::body::DeformableBodyHandle;
-use crate::contact::{Constraint, Endpoint};
+use crate::body::{ConstraintKey, DeformableBodyHandle};
+use crate::contact::{Constraint, Endpoint, Obstacle};
 use crate::math::Vec3;
-use crate::solver::BodyProblem;
+use crate::solver::{BodyProblem, Reaction};
+use rapier3d::dynamics::RigidBodyHandle;
 
 /// A body as its island left it, and what it may have touched.
 pub(crate) struct SolvedBody<'a> {
@@ -27,6 +28,9 @@ pub(crate) struct SolvedContact<'a> {
     pub is_on_prescribed: bool,
     /// The deformable bodies at both endpoints.
     pub bodies: [Option<DeformableBodyHandle>; 2],
+    /// The rigid body at endpoint 1, and what of it is touched.
+    pub rigid: Option<RigidBodyHandle>,
+    pub obstacle: Option<&'a Obstacle>,
 }
 
 impl StepScratch {
@@ -59,6 +63,8 @@ impl StepScratch {
                 motion: constraint.relative(moved) - constraint.surface_motion,
                 is_on_prescribed: body.is_of(local) && partner.proxy().is_some_and(is_led),
                 bodies: [body_of(body), body_of(partner)],
+                rigid: partner.proxy().and_then(|proxy| self.scene.handles[proxy.0 as usize]),
+                obstacle: self.obstacle(constraint),
             }
         });
         Some(SolvedBody {
@@ -67,6 +73,17 @@ impl StepScratch {
             in_flight: contacts.active.is_empty(),
             contact_error: work.island.report.contacts.error,
         })
+    }
+
+    fn obstacle(&self, constraint: &Constraint) -> Option<&Obstacle> {
+        let ConstraintKey::Obstacle(key) = constraint.key else { return None };
+        self.scene.obstacles.iter().find(|obstacle| obstacle.key == key.collider && obstacle.part == key.part)
+    }
+
+    /// What the last step has done to a rigid body; `None` of one that nothing of it has met.
+    pub fn reaction_on(&self, body: RigidBodyHandle) -> Option<Reaction> {
+        let proxy = self.scene.handles.iter().position(|handle| *handle == Some(body))?;
+        self.reaction_list.get(proxy).copied().filter(|reaction| reaction.touched)
     }
 
     fn problem(&self, handle: DeformableBodyHandle) -> Option<&BodyProblem> {

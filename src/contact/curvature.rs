@@ -1,0 +1,103 @@
+//! How the normals of round obstacles turn from point to point, and where the edges of boxes are: what a gradient asks.
+
+use super::obstacle::Obstacle;
+use crate::math::{Mat3, Vec3, from_real};
+use parry3d::shape::TypedShape;
+
+/// Part of a box's half extent within which a point is on its edge: contacts are there to `f32`.
+const ON_EDGE: f64 = 1.0e-4;
+
+/// Turn of the outward normal over the obstacle's surface per metre that a point near it goes along it [1/m]: symmetric, along the surface
+/// only. Point and normal are in the obstacle's frame. That of balls, capsules, cylinders and cones; of others none, as of plane faces.
+pub(crate) fn curvature(obstacle: &Obstacle, point: &Vec3, normal: &Vec3) -> Mat3 {
+    let about = |centre: Vec3| {
+        let distance = (point - centre).norm();
+        let along = Mat3::identity() - normal * normal.transpose();
+        if distance > 0.0 { along / distance } else { Mat3::zeros() }
+    };
+    let around_y = || {
+        // The normal leans by the same angle all around.
+        let (out, across) = (normal.x.hypot(normal.z), Vec3::y().cross(normal));
+        let distance = point.x.hypot(point.z);
+        match across.try_normalize(0.0) {
+            Some(across) if distance > 0.0 => across * across.transpose() * (out / distance),
+            _ => Mat3::zeros(),
+        }
+    };
+    match obstacle.shape.as_typed_shape() {
+        TypedShape::Ball(_) => about(Vec3::zeros()),
+        TypedShape::Capsule(capsule) => {
+            let [a, b] = [capsule.segment.a, capsule.segment.b].map(from_real);
+            let axis = b - a;
+            let place = (point - a).dot(&axis) / axis.norm_squared();
+            if !(0.0..=1.0).contains(&place) {
+                return about(if place > 1.0 { b } else { a });
+            }
+            let distance = (point - a - axis * place).norm();
+            let across = axis.cross(normal).normalize();
+            if distance > 0.0 { across * across.transpose() / distance } else { Mat3::zeros() }
+        }
+        TypedShape::Cylinder(_) | TypedShape::Cone(_) => around_y(),
+        _ => Mat3::zeros(),
+    }
+}
+
+/// Two points of the edge of a box that a point is on, away from its corners, in the obstacle's frame.
+pub(crate) fn box_edge_at(obstacle: &Obstacle, point: &Vec3) -> Option<[Vec3; 2]> {
+    let half = from_real(obstacle.shape.as_cuboid()?.half_extents);
+    let is_beside = |k: usize| (point[k].abs() - half[k]).abs() <= ON_EDGE * half[k];
+    let beside = [0, 1, 2].map(is_beside);
+    let along = (0..3).find(|&k| !beside[k] && beside[(k + 1) % 3] && beside[(k + 2) % 3])?;
+    let end = |sign: f64| {
+        Vec3::from_fn(|k, _| if k == along { sign * half[k] } else { point[k].signum() * half[k] })
+    };
+    Some([end(-1.0), end(1.0)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::surface_point::{Scales, surface_point};
+    use parry3d::math::Vector;
+    use parry3d::shape::SharedShape;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Against differences of the normals that contacts have.
+        #[test]
+        fn normals_turn_as_told(which in 0..5usize, x in -1.0..1.0f64, y in -1.0..1.0f64, z in -1.0..1.0f64, along in 0..3usize) {
+            let shapes = [
+                SharedShape::ball(0.5),
+                SharedShape::capsule(Vector::new(-0.3, 0.1, 0.2), Vector::new(0.2, -0.1, 0.4), 0.3),
+                SharedShape::cylinder(0.5, 0.4),
+                SharedShape::cone(0.5, 0.4),
+                SharedShape::cuboid(0.5, 0.4, 0.3),
+            ];
+            let obstacle = Obstacle::at_origin(shapes[which].clone());
+            let direction = Vec3::new(x, y, z);
+            prop_assume!(direction.norm() > 0.1);
+            let scales = Scales { band: 1e-6, shift: 0.01, extent: 0.0, middle: direction };
+            let at = |p: &Vec3| surface_point(&obstacle, p, &-direction.normalize(), &scales);
+            let far = direction.normalize() * 2.0;
+            let foot = at(&far).unwrap();
+            let p = foot.point + foot.normal * 0.1;
+            let turn = curvature(&obstacle, &p, &foot.normal);
+            let by = Vec3::ith(along, 0.01);
+            let [more, less] = [by, -by].map(|by| at(&(p + by)).unwrap().normal);
+            let slope = (more - less) / 0.02;
+            // Sharp edges are not told of, nor the borders between what is round and what is plane.
+            let [ahead, behind] = [by, -by].map(|by| curvature(&obstacle, &(p + by), &at(&(p + by)).unwrap().normal));
+            let on_edge = |n: &Vec3| match which {
+                2 => n.y.abs() > 1e-3 && n.y.abs() < 0.999,
+                // Its flank leans by atan(0.4).
+                3 => (n.y - 0.3714).abs() > 1e-3 && n.y > -0.999,
+                4 => n.amax() < 0.999,
+                _ => false,
+            };
+            prop_assume!(![more, less, foot.normal].iter().any(on_edge));
+            prop_assume!((ahead - behind).amax() < 0.5);
+            // parry's f32 over 2 cm: 1e-5.
+            prop_assert!((turn.column(along) - slope).norm() < 2e-2 * (1.0 + turn.amax()), "{which}: {turn} {slope}");
+        }
+    }
+}

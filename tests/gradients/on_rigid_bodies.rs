@@ -1,0 +1,303 @@
+//! Gradients over steps of deformable bodies that touch rigid ones that yield, against central differences between whole runs. Rapier is in
+//! `f32`: what is changed is changed by powers of two, by so much that its last places do not count.
+
+use crate::differences::{slopes, weight};
+use foible3d::prelude::*;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use rapier3d::prelude::*;
+
+/// What a run depends on.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    values: [f64; 13],
+}
+
+const NAMES: [&str; 13] = [
+    "modulus",
+    "density",
+    "density of the rigid body, over that",
+    "gravity",
+    "friction",
+    "launch along x",
+    "launch along y",
+    "spin about z",
+    "place along x",
+    "place along y",
+    "turn about z",
+    "place of a vertex",
+    "lead of the pins",
+];
+const BY: [f64; 13] = [
+    512.0,
+    8.0,
+    1.0 / 64.0,
+    1.0 / 16.0,
+    1.0 / 128.0,
+    1.0 / 64.0,
+    1.0 / 64.0,
+    1.0 / 16.0,
+    1.0 / 1024.0,
+    1.0 / 16384.0,
+    1.0 / 1024.0,
+    1.0 / 4096.0,
+    1.0 / 64.0,
+];
+
+/// By how much `f32` lets losses be off, and forces \[N\], in these scenes: differences by a quarter of those here are off by that over them.
+const ROUNDING: [f64; 2] = [3e-8, 1e-4];
+/// What is left beside that.
+const EXACT: f64 = 1e-3;
+/// Part of a derivative that rounding may be, or its differences say nothing.
+const FELT: f64 = 0.02;
+
+/// A pinned body below a rigid one.
+struct Scene {
+    soft: DeformableBodyBuilder,
+    pins: fn(Vector) -> bool,
+    shape: SharedShape,
+    rigid: RigidBodyBuilder,
+    /// Of the rigid one [kg/m³].
+    density: f32,
+    steps: usize,
+    /// The step whose force is looked at.
+    look: usize,
+    stride: f64,
+}
+
+struct Outcome {
+    loss: f64,
+    tape: DeformableTape,
+    of_loss: DeformableLoss,
+    collider: ColliderHandle,
+    mass: f64,
+    /// The vertex that is shifted at first.
+    shifted: usize,
+    force: [f64; 3],
+    h: f64,
+}
+
+fn wide(v: Vector) -> Vector3<f64> {
+    Vector3::new(v.x.into(), v.y.into(), v.z.into())
+}
+
+/// A vector that a body turns.
+fn turned(body: &RigidBody, vector: [f64; 3]) -> Vector3<f64> {
+    let [x, y, z, w] = body.rotation().to_array().map(f64::from);
+    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)) * Vector3::from(vector)
+}
+
+impl Scene {
+    fn run(&self, run: &Run) -> Outcome {
+        let [modulus, density, heaviness, gravity, friction, along, down, spin, x, y, turn, low, lead] = run.values;
+        let mut physics = PhysicsWorld::new();
+        physics.gravity = Vector::Y * gravity as f32;
+        let mut world = DeformableWorld::new();
+        let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
+        let settings = settings.contact_tolerance(1e-12).keeps_spin(false);
+        let material = DeformableMaterial::new(modulus, 0.3).density(density).mass_damping(1.0).friction(friction);
+        let soft = self.soft.clone().pinned(self.pins).material(material).can_sleep(false).settings(settings);
+        let soft = world.insert(soft).unwrap();
+        let rigid = self.rigid.clone();
+        let place = rigid.position.translation + Vector::new(x as f32, y as f32, 0.0);
+        let rotation = Rotation::from_rotation_z(turn as f32) * rigid.position.rotation;
+        let rigid = rigid
+            .pose(Pose::from_parts(place, rotation))
+            .linvel(Vector::new(along as f32, down as f32, 0.0))
+            .angvel(Vector::new(0.0, 0.0, spin as f32))
+            .can_sleep(false);
+        let collider = ColliderBuilder::new(self.shape.clone()).density(self.density * heaviness as f32).friction(friction as f32);
+        let (rigid, collider) = physics.insert(rigid, collider);
+        let body = &mut world.bodies[soft];
+        let far = |v: &usize| {
+            let x = body.position(*v).unwrap();
+            (x[0] - 0.12).powi(2) + (x[1] + 0.125).powi(2) + (x[2] - 0.01).powi(2)
+        };
+        let shifted = (0..body.vertex_count()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
+        let at = body.position(shifted).unwrap();
+        body.set_position(shifted, [at[0] + low, at[1] - 0.5 * low, at[2] - low]).unwrap();
+        for vertex in body.pinned().collect::<Vec<_>>() {
+            body.set_pin_velocity(vertex, Vector::new(lead as f32, 0.0, 0.5 * lead as f32)).unwrap();
+        }
+        let tape = DeformableTape::new(&world, soft).unwrap();
+        let mut tape = tape.with_rigid_bodies(&physics, &[rigid]).unwrap();
+        let (mut loss, mut states) = (0.0, Vec::new());
+        for step in 0..self.steps {
+            tape.step(&mut physics, &mut world).unwrap();
+            if step + 1 == self.steps || step + 1 == self.steps / 2 {
+                let body = &world.bodies[soft];
+                let at = |v: usize| (body.position(v).unwrap(), body.velocity(v).unwrap());
+                let vertices: Vec<_> = (0..body.vertex_count()).map(at).collect();
+                states.push((step, vertices, physics.bodies[rigid].clone()));
+            }
+        }
+        let mut of_loss = tape.loss();
+        for (step, vertices, rigid_body) in states {
+            for (vertex, (x, v)) in vertices.into_iter().enumerate() {
+                let a = [0, 1, 2].map(|k| 0.1 * weight(3 * vertex + k));
+                let b = [0, 1, 2].map(|k| 0.002 * weight(5 * vertex + k));
+                loss += (0..3).map(|k| a[k] * x[k] + 0.05 * x[k] * x[k] + b[k] * v[k]).sum::<f64>();
+                of_loss.add_position(step, vertex, [0, 1, 2].map(|k| a[k] + 0.1 * x[k])).unwrap();
+                of_loss.add_velocity(step, vertex, b).unwrap();
+            }
+            let [a, b, c] = [7, 20, 33].map(|first| Vector3::from_fn(|k, _| weight(first + k)));
+            let (com, arm) = (wide(rigid_body.center_of_mass()), turned(&rigid_body, [0.5, -0.25, 1.0]));
+            let (linvel, angvel) = (wide(rigid_body.linvel()), wide(rigid_body.angvel()));
+            loss += a.dot(&com) + b.dot(&arm) + 0.1 * c.dot(&linvel) + 0.05 * a.dot(&angvel);
+            of_loss.add_rigid_position(step, rigid, a.into()).unwrap();
+            of_loss.add_rigid_rotation(step, rigid, arm.cross(&b).into()).unwrap();
+            of_loss.add_rigid_linvel(step, rigid, (0.1 * c).into()).unwrap();
+            of_loss.add_rigid_angvel(step, rigid, (0.05 * a).into()).unwrap();
+        }
+        let force = tape.contact_force(self.look, collider);
+        let mass = f64::from(physics.bodies[rigid].mass()) / heaviness;
+        let h = f64::from(physics.integration_parameters.dt);
+        Outcome { loss, tape, of_loss, collider, mass, shifted, force, h }
+    }
+}
+
+/// The derivative with respect to a value of a run.
+fn derivative(out: &Outcome, of: &DeformableGradient, which: usize) -> f64 {
+    let rigid = &of.rigid_bodies[0];
+    match which {
+        0 => of.material().youngs_modulus,
+        1 => of.material().density,
+        2 => rigid.mass * out.mass,
+        3 => of.gravity()[1] + rigid.gravity()[1],
+        4 => of.friction,
+        5 => rigid.initial_linvel[0],
+        6 => rigid.initial_linvel[1],
+        7 => rigid.initial_angvel[2],
+        8 => rigid.initial_position[0],
+        9 => rigid.initial_position[1],
+        10 => rigid.initial_rotation[2],
+        11 => {
+            let [x, y, z] = of.initial_positions[out.shifted];
+            x - 0.5 * y - z
+        }
+        // Led at a velocity, pins have gone by (k + 1) h of it at the end of step k.
+        _ => {
+            let of_step = |(k, step): (usize, &StepGradient)| {
+                (k + 1) as f64 * out.h * step.pin_targets.iter().map(|t| t[0] + 0.5 * t[2]).sum::<f64>()
+            };
+            of.steps.iter().enumerate().map(of_step).sum()
+        }
+    }
+}
+
+/// The largest relative errors against differences of the fourth order, of the state, and of the force on the rigid body; and of how many
+/// derivatives. Others have a kink near by, which differences by twice as much cross: a contact that opens or closes.
+fn errors(scene: &Scene, run: &Run, which: &[usize]) -> ([f64; 2], usize) {
+    let out = scene.run(run);
+    let across = [0.25, 1.0, -0.5];
+    let along = |force: [f64; 3]| (0..3).map(|k| across[k] * force[k]).sum::<f64>();
+    let mut of_force = out.tape.loss();
+    of_force.add_contact_force(scene.look, out.collider, across).unwrap();
+    let gradients = [&out.of_loss, &of_force].map(|loss| out.tape.backward(loss).unwrap());
+    let (mut largest, mut count) = ([0.0_f64; 2], 0);
+    for &which in which {
+        let by = BY[which] * scene.stride;
+        let at = |d: f64| {
+            let mut changed = *run;
+            changed.values[which] += d;
+            let out = scene.run(&changed);
+            [out.loss, along(out.force)]
+        };
+        let (near, far) = (slopes(by, at), slopes(2.0 * by, at));
+        for (k, what) in ["state", "force"].into_iter().enumerate() {
+            let (ours, slope, rounding) = (derivative(&out, &gradients[k], which), near[k], ROUNDING[k] / by);
+            let is_smooth = (far[k] - slope).abs() <= EXACT * slope.abs() + rounding;
+            let is_felt = rounding <= FELT * slope.abs();
+            let error = ((ours - slope).abs() - rounding).max(0.0) / slope.abs();
+            let name = NAMES[which];
+            println!("  {name} of {what}: {ours:.9e} against {slope:.9e}, {error:.1e}, {:.0e} {is_smooth} {is_felt}", rounding / slope.abs());
+            if is_smooth && is_felt {
+                count += 1;
+                largest[k] = if error.is_nan() { f64::INFINITY } else { largest[k].max(error) };
+            }
+        }
+    }
+    println!("  worst {largest:?} of {count}");
+    (largest, count)
+}
+
+fn run(friction: f64, along: f64, down: f64) -> Run {
+    Run { values: [5.0e4, 1000.0, 1.0, -9.75, friction, along, down, 0.0625, 0.0, 0.0, 0.0, 1.0 / 1024.0, 0.0] }
+}
+
+fn block(half: f32, cells: usize) -> DeformableBodyBuilder {
+    let cube = DeformableBodyBuilder::cuboid(Vector::new(half, 0.125, half), [cells, 2, cells]);
+    cube.translation(Vector::Y * -0.125)
+}
+
+const ALL: [usize; 13] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12];
+
+const WITHOUT_FRICTION: [usize; 12] = [0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 11, 12];
+
+fn plate() -> Scene {
+    Scene {
+        soft: block(0.125, 2),
+        pins: |x| x.y < -0.249,
+        shape: SharedShape::cuboid(0.25, 0.03125, 0.25),
+        rigid: RigidBodyBuilder::dynamic().translation(Vector::new(0.01, 0.032, -0.005)),
+        density: 512.0,
+        steps: 12,
+        look: 7,
+        stride: 0.5,
+    }
+}
+
+fn on_corners(place: [f32; 2], turn: f32) -> Scene {
+    let rigid = RigidBodyBuilder::dynamic().translation(Vector::new(place[0], 0.0632, place[1]));
+    Scene {
+        soft: block(0.25, 2),
+        shape: SharedShape::cuboid(0.1, 0.0625, 0.07),
+        rigid: rigid.rotation(Vector::Y * turn),
+        stride: 0.25,
+        ..plate()
+    }
+}
+
+/// Four pyramids, on whose tips something round touches nothing but these.
+fn tips() -> DeformableBodyBuilder {
+    let (mut vertices, mut tetrahedra) = (Vec::new(), Vec::new());
+    for [x, z] in [[-0.15, -0.1], [0.12, -0.13], [0.14, 0.11], [-0.11, 0.14]] {
+        let first = vertices.len() as u32;
+        let base = [[0.08, 0.0], [-0.04, -0.08], [-0.05, 0.07]];
+        vertices.extend(base.map(|[u, w]| [x + u, -0.25, z + w]));
+        vertices.push([x, 0.0, z]);
+        tetrahedra.push([first, first + 1, first + 2, first + 3]);
+    }
+    let mesh = TetMesh::new(vertices, tetrahedra).unwrap();
+    DeformableBodyBuilder::mesh(&mesh)
+}
+
+
+fn on_tips(shape: SharedShape, turn: Vector, height: f32) -> Scene {
+    let rigid = RigidBodyBuilder::dynamic().translation(Vector::new(0.02, height, 0.01)).rotation(turn);
+    Scene { soft: tips(), shape, rigid, density: 16.0, ..plate() }
+}
+
+#[test]
+fn zz_scan() {
+    let scan = |name: &str, scene: Scene, run: Run, which: &[usize]| {
+        let got = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| errors(&scene, &run, which)));
+        println!("{name} {got:?}");
+    };
+    scan("sticks", plate(), run(1.0, 0.0625, -0.5), &WITHOUT_FRICTION);
+    scan("slides", plate(), run(0.25, 1.5, -0.5), &ALL);
+    for friction in [0.0, 0.25] {
+        for x in [0.01, 0.06, 0.1] { for z in [0.0, 0.05] { for turn in [0.2, 0.5] {
+            for along in [0.0, 0.5] {
+                scan(&format!("box {friction} {x} {z} {turn} {along}"), on_corners([x, z], turn), run(friction, along, -0.125), &WITHOUT_FRICTION);
+            }
+        }}}
+    }
+    let round = [3, 0, 1, 2, 5, 6, 7, 8, 9, 10, 12];
+    for friction in [0.0, 0.5, 1.0] {
+        scan("ball", on_tips(SharedShape::ball(0.5), Vector::ZERO, 0.4675), run(friction, 0.0625, -0.5), &round);
+        scan("capsule", on_tips(SharedShape::capsule_y(0.5, 0.3), Vector::X * 1.5, 0.28), run(friction, 0.0625, -0.5), &round);
+        scan("cylinder", on_tips(SharedShape::cylinder(0.5, 0.3), Vector::X * 1.5, 0.28), run(friction, 0.0625, -0.5), &round);
+        scan("cone", on_tips(SharedShape::cone(0.5, 0.5), Vector::new(2.04, 0.1, 0.0), 0.3), run(friction, 0.0625, -0.5), &round);
+        scan("plate", on_tips(SharedShape::cuboid(0.5, 0.05, 0.4), Vector::ZERO, 0.051), run(friction, 0.0625, -0.5), &round);
+    }
+}
