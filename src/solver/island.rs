@@ -69,6 +69,11 @@ const MOST_REDONE: usize = 100;
 /// to 1.795; with steps of a sixteenth it is 1.80 and 1.81.
 const STRICT: f64 = 1.0e-10;
 const SETTLING: usize = 30;
+/// Iterations of such a step after which open contacts have their shift too, if it is not solved by then: without it, one that opens by less than that takes
+/// turns with itself, and no force is ever solved. Of 144 boxes of 3 kg that fall on blocks of 5e4 Pa with friction of 0.25 to 1, at 1/60 s, 120 had such
+/// a step among twelve, none has now; after 4 iterations or 16 none either, in 0.9 and 1.2 times the time, after 2 a finger that a cable presses on a floor
+/// has gradients that are off.
+const TAKING_TURNS: usize = 8;
 /// Part of the contacts that may close after a solve and wait for the next iteration of a crowd.
 const FEW_LATE: f64 = 0.01;
 
@@ -109,6 +114,7 @@ impl Island {
         self.contacts.is_settling = false;
         for iteration in 1..=iterations {
             self.report.iterations += 1;
+            self.contacts.is_settling |= is_strict && iteration > TAKING_TURNS;
             let may_wait = iteration < iterations && self.bodies.len() >= CROWD;
             let outcome = self.iterate(may_wait, context);
             if !self.contacts.is_empty() {
