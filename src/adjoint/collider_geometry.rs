@@ -11,7 +11,9 @@
 
 use super::contact_record::{ContactRecord, RigidTouch, TapeBody};
 use crate::body::{ConstraintKey, Feature};
-use crate::contact::{Endpoint, Obstacle, barycentric, box_edge_at, curvature, normal_of, places_at};
+use crate::contact::{
+    Endpoint, Obstacle, SHIFT, barycentric, box_edge_at, curvature, is_box_corner, normal_of, places_at,
+};
 use crate::math::{Mat3, Vec3};
 use crate::pipeline::SolvedContact;
 
@@ -31,6 +33,17 @@ enum Kind {
     Edges { nodes: Vec<Node>, edge: [Vec3; 2], sign: f64 },
     /// An edge that passes under the rim of a face of the collider: of that two points, and one that is off the first along the face's normal.
     UnderRim { nodes: Vec<Node>, rim: [Vec3; 3] },
+    /// An edge, the first two of a triangle's nodes, and a corner of a box, which look at each other along what is shortest between them once the triangle is
+    /// shifted back into its body, or once more along that.
+    EdgeOnCorner { nodes: Vec<Node>, corner: Vec3, shift: Shift },
+}
+
+/// How a triangle is shifted before closest points are sought.
+#[derive(Clone, Copy, Debug)]
+struct Shift {
+    /// Along the triangle's normal by the order of its nodes \[m\]; negative if that is outward.
+    back: f64,
+    is_twice: bool,
 }
 
 /// A node of the body.
@@ -49,6 +62,8 @@ pub(super) struct ColliderGeometry {
     kind: Kind,
     /// On the collider.
     place: Vec3,
+    /// From there to the point of the body, at the start.
+    apart: Vec3,
 }
 
 /// Derivatives of the Lagrangian with respect to a normal, the place on the collider, and the arm there.
@@ -84,16 +99,24 @@ impl ColliderGeometry {
                 let radius = obstacle.shape.as_ball().map(|ball| f64::from(ball.radius));
                 radius.and_then(|radius| on_triangle(&nodes, normal, place, radius))
             }
+            Feature::Edge(_) if is_box_corner(obstacle, &obstacle.start.inverse_transform(&place)) => {
+                on_corner(soft, normal, place, body)
+            }
             Feature::Edge(_) => on_box_edge(&nodes, normal, &place, obstacle),
             Feature::Node(_) | Feature::Triangle(_) => None,
         };
+        if kind.is_none() && !matches!(key.feature, Feature::Node(_)) && std::env::var_os("ZZ").is_some() { eprintln!("ZZ {:?} new {is_new} lp {:?} ln {:?} gap {:.1e} f {:.2}", key.feature, obstacle.start.inverse_transform(&place).as_slice(), obstacle.start.rotation.tr_mul(normal).as_slice(), constraint.gap, contact.force.norm()); }
         let on_surface = || {
             let (pose, point) = (obstacle.start, soft.interpolate(body.x_start));
             let (local, rotation) = (pose.inverse_transform(&point), pose.rotation);
-            let turn = rotation * curvature(obstacle, &local, &rotation.tr_mul(normal)) * rotation.transpose();
+            // An edge against that of a box is none of its points against it.
+            let is_point = !obstacle.kind().is_faceted || matches!(key.feature, Feature::Node(_));
+            let turn = if is_point { curvature(obstacle, &local, &rotation.tr_mul(normal)) } else { Mat3::zeros() };
+            let turn = rotation * turn * rotation.transpose();
             Kind::OnSurface { point, gap: normal.dot(&(point - place)), turn }
         };
-        Some(Self { kind: kind.unwrap_or_else(on_surface), place })
+        let apart = soft.interpolate(body.x_start) - place;
+        Some(Self { kind: kind.unwrap_or_else(on_surface), place, apart })
     }
 
     /// Adds it, with what z, q and the loss of its force say of a contact, and the turn of its partner's body in the step.
@@ -104,7 +127,7 @@ impl ColliderGeometry {
         (of_force, partner_turn): (&Vec3, &Vec3),
         out: &mut OfPlaces<'_>,
     ) {
-        let of = OfGeometry::new(contact, (z, q), (of_force, partner_turn));
+        let of = OfGeometry::new(contact, (z, q), (of_force, partner_turn), &self.apart);
         out.com -= of.arm;
         let of_weights = |nodes: &[Node]| -> Vec<f64> {
             let of_weight = |node: &Node| {
@@ -144,6 +167,13 @@ impl ColliderGeometry {
                     Some(of.said(&normal, &place) + of_weights[0] * (1.0 - s) + of_weights[1] * s)
                 });
             }
+            Kind::EdgeOnCorner { nodes, corner, shift } => {
+                let of_weights = of_weights(&nodes[..2]);
+                out.add_by_differences(contact, nodes, &[*corner], &|x| {
+                    let (normal, s) = shift.across(&[x[0], x[1], x[2]], &x[3])?;
+                    Some(of.said(&normal, &x[3]) + of_weights[0] * (1.0 - s) + of_weights[1] * s)
+                });
+            }
             Kind::UnderRim { nodes, rim } => {
                 let of_weights = of_weights(nodes);
                 out.add_by_differences(contact, nodes, rim, &|x| {
@@ -165,6 +195,7 @@ impl OfGeometry {
         contact: &ContactRecord,
         (z, q): (&[Vec3], &[f64]),
         (of_force, partner_turn): (&Vec3, &Vec3),
+        apart: &Vec3,
     ) -> Self {
         let [normal, tangents @ ..] = &contact.frame;
         let (force, motion) = (contact.force, contact.motion);
@@ -172,8 +203,8 @@ impl OfGeometry {
         let rubbed = force - normal * normal.dot(&force);
         let of_slips = tangents.iter().zip(&q[1..]).map(|(tangent, q)| contact.looks_along(tangent) * *q);
         let looks = of_slips.fold(Vec3::zeros(), |sum, look| sum + look);
-        // Along the surface the node has gone against the place just as it has moved.
-        let of_normal = said * normal.dot(&force) - rubbed * normal.dot(&said) + motion * q[0]
+        let ends = if contact.recovers { motion } else { motion + apart };
+        let of_normal = said * normal.dot(&force) - rubbed * normal.dot(&said) + ends * q[0]
             - looks * normal.dot(&motion);
         let arm = contact.rigid.map_or(Vec3::zeros(), |at| {
             -force.cross(&z[at.node + 1]) - (normal * q[0] + looks).cross(partner_turn)
@@ -259,6 +290,34 @@ fn on_box_edge(nodes: &[Node], normal: &Vec3, place: &Vec3, obstacle: &Obstacle)
     let is_of_face = obstacle.start.rotation.tr_mul(normal).amax() > 1.0 - SAME * SAME;
     let off = edge[0] + normal * (edge[1] - edge[0]).norm();
     is_of_face.then(|| Kind::UnderRim { nodes, rim: [edge[0], edge[1], off] })
+}
+
+impl Shift {
+    /// The direction from a corner to the first edge of a triangle, and the place on that.
+    fn across(&self, [a, b, c]: &[Vec3; 3], corner: &Vec3) -> Option<(Vec3, f64)> {
+        let back = normal_of(&[*a, *b, *c])? * self.back;
+        let edge = b - a;
+        let foot = |by: &Vec3| {
+            let place = (corner - a - by).dot(&edge) / edge.norm_squared();
+            Some(((a + by + edge * place - corner).try_normalize(0.0)?, place))
+        };
+        let (normal, place) = foot(&back)?;
+        if self.is_twice { foot(&(normal * self.back.abs())) } else { Some((normal, place)) }
+    }
+}
+
+/// An edge of the body on a corner of a box, if the normal is that of closest points.
+fn on_corner(soft: &Endpoint, normal: &Vec3, corner: Vec3, body: &TapeBody<'_>) -> Option<Kind> {
+    let Endpoint::Soft { nodes, weights, .. } = soft else { return None };
+    let opposite = weights.iter().position(|weight| *weight == 0.0)?;
+    let nodes = [1, 2, 0].map(|k| Node::new(nodes[(opposite + k) % 3] as usize, body));
+    let x = nodes.map(|node| node.x_start);
+    let size = SHIFT * body.model.surface.mean_edge;
+    let back = size * normal_of(&x)?.dot(normal).signum();
+    let shifts = [true, false].map(|is_twice| Shift { back, is_twice });
+    let is_it = |shift: &Shift| shift.across(&x, &corner).is_some_and(|(own, _)| own.cross(normal).norm() < SAME);
+    let shift = shifts.into_iter().find(is_it)?;
+    Some(Kind::EdgeOnCorner { nodes: nodes.to_vec(), corner, shift })
 }
 
 /// The direction across two edges.

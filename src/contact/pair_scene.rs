@@ -19,7 +19,7 @@ pub(crate) struct Pair {
 }
 
 /// Part of the mean edge by which nodes are shifted back to tell inside from outside.
-const SHIFT: f64 = 0.1;
+pub(crate) const SHIFT: f64 = 0.1;
 /// Part of the body's size within which a projection's direction is not trusted.
 const BAND: f64 = 1.0e-4;
 
