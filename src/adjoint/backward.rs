@@ -5,9 +5,7 @@
 
 use super::cables::{CableRecord, EndOfCable, OfCable};
 use super::filled_rooms::of_pressures;
-use super::gradient::{
-    CableGradient, DeformableGradient, MaterialGradient, RigidBodyGradient, StepGradient,
-};
+use super::gradient::{CableGradient, DeformableGradient, MaterialGradient, RigidBodyGradient, StepGradient};
 use super::joint_solve::{Solved, solve};
 use super::loss::Seed;
 use super::parameters::{ElasticWork, Inertia};

@@ -105,13 +105,13 @@ impl ColliderGeometry {
             Feature::Edge(_) => on_box_edge(&nodes, normal, &place, obstacle),
             Feature::Node(_) | Feature::Triangle(_) => None,
         };
-        if kind.is_none() && !matches!(key.feature, Feature::Node(_)) && std::env::var_os("ZZ").is_some() { eprintln!("ZZ {:?} new {is_new} lp {:?} ln {:?} gap {:.1e} f {:.2}", key.feature, obstacle.start.inverse_transform(&place).as_slice(), obstacle.start.rotation.tr_mul(normal).as_slice(), constraint.gap, contact.force.norm()); }
         let on_surface = || {
             let (pose, point) = (obstacle.start, soft.interpolate(body.x_start));
             let (local, rotation) = (pose.inverse_transform(&point), pose.rotation);
             // An edge against that of a box is none of its points against it.
             let is_point = !obstacle.kind().is_faceted || matches!(key.feature, Feature::Node(_));
-            let turn = if is_point { curvature(obstacle, &local, &rotation.tr_mul(normal)) } else { Mat3::zeros() };
+            let turn =
+                if is_point { curvature(obstacle, &local, &rotation.tr_mul(normal)) } else { Mat3::zeros() };
             let turn = rotation * turn * rotation.transpose();
             Kind::OnSurface { point, gap: normal.dot(&(point - place)), turn }
         };
@@ -133,7 +133,11 @@ impl ColliderGeometry {
             let of_weight = |node: &Node| {
                 let moved = node.x_end - node.x_start;
                 let [normal, ..] = &contact.frame;
-                let counts = if contact.recovers { normal.dot(&moved) } else { normal.dot(&node.x_end) - node.half_thickness };
+                let counts = if contact.recovers {
+                    normal.dot(&moved)
+                } else {
+                    normal.dot(&node.x_end) - node.half_thickness
+                };
                 z[node.place].dot(&contact.force) + q[0] * counts + of.looks.dot(&moved)
             };
             nodes.iter().map(of_weight).collect()
@@ -315,7 +319,8 @@ fn on_corner(soft: &Endpoint, normal: &Vec3, corner: Vec3, body: &TapeBody<'_>) 
     let size = SHIFT * body.model.surface.mean_edge;
     let back = size * normal_of(&x)?.dot(normal).signum();
     let shifts = [true, false].map(|is_twice| Shift { back, is_twice });
-    let is_it = |shift: &Shift| shift.across(&x, &corner).is_some_and(|(own, _)| own.cross(normal).norm() < SAME);
+    let is_it =
+        |shift: &Shift| shift.across(&x, &corner).is_some_and(|(own, _)| own.cross(normal).norm() < SAME);
     let shift = shifts.into_iter().find(is_it)?;
     Some(Kind::EdgeOnCorner { nodes: nodes.to_vec(), corner, shift })
 }

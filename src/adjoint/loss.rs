@@ -1,11 +1,11 @@
 //! What a loss depends on: its derivatives with respect to what was recorded.
 
+use super::rigid_flight::OfState;
 use crate::body::{DeformableBodyHandle, DeformableCableHandle};
 use crate::coupling::packed;
 use crate::error::BodyError;
 use crate::fem::DeformableModel;
 use crate::math::Vec3;
-use super::rigid_flight::OfState;
 use rapier3d::dynamics::RigidBodyHandle;
 use rapier3d::geometry::ColliderHandle;
 use std::sync::Arc;

@@ -134,7 +134,8 @@ mod tests {
             .linear_damping(0.5)
             .angular_damping(0.25)
             .gyroscopic_forces_enabled(gyroscopic);
-        let (handle, _) = physics.insert(body, ColliderBuilder::cuboid(0.3, 0.1, 0.05).translation(Vector::X * 0.1));
+        let (handle, _) =
+            physics.insert(body, ColliderBuilder::cuboid(0.3, 0.1, 0.05).translation(Vector::X * 0.1));
         physics.step();
         let body = &mut physics.bodies[handle];
         body.add_force(Vector::new(1.0, -2.0, 0.5), true);
@@ -167,7 +168,12 @@ mod tests {
             let theirs = RigidState::of(body);
             // f32 of velocities of up to 8 and positions below 1, over four substeps.
             assert!((ours.linvel - from_real(body.linvel())).norm() < 1e-6);
-            assert!((ours.angvel - from_real(body.angvel())).norm() < 4e-6, "{} {}", ours.angvel, theirs.angvel);
+            assert!(
+                (ours.angvel - from_real(body.angvel())).norm() < 4e-6,
+                "{} {}",
+                ours.angvel,
+                theirs.angvel
+            );
             assert!((ours.com - theirs.com).norm() < 4e-7);
             assert!(rotation_vector(&(ours.rotation * theirs.rotation.transpose())).norm() < 2e-6);
             // Without gyroscopic forces it would be this far off.

@@ -67,7 +67,8 @@ impl RigidRecord {
         let (h, state, load) = (f64::from(parameters.dt), start.state, start.load);
         let reaction = deformables.pipeline.reaction_on(handle);
         check_contacts(reaction.as_ref(), contacts, &state.com, h)?;
-        let gained = [load.inv_mass.component_mul(&load.force) + load.falls(), load.inv_inertia * load.torque];
+        let gained =
+            [load.inv_mass.component_mul(&load.force) + load.falls(), load.inv_inertia * load.torque];
         let mut flight_from = state;
         let mut flight = Flight {
             h,
@@ -126,6 +127,6 @@ fn check_contacts<'a>(
     if is_all { Ok(()) } else { Err(MOVED_BY_OTHERS) }
 }
 
-pub(super) const NOT_FREE: &str = "a rigid body of the tape is not there, not dynamic, not enabled, or part of a multibody";
-const MOVED_BY_OTHERS: &str =
-    "a rigid body of the tape is moved by what has no gradient: other rigid bodies, joints, attachments, or bodies that are not on the tape";
+pub(super) const NOT_FREE: &str =
+    "a rigid body of the tape is not there, not dynamic, not enabled, or part of a multibody";
+const MOVED_BY_OTHERS: &str = "a rigid body of the tape is moved by what has no gradient: other rigid bodies, joints, attachments, or bodies that are not on the tape";

@@ -1,10 +1,10 @@
 //! The way back over the steps of a tape, from what was kept of them or from checkpoints.
 
 use super::backward::{Backward, go_back};
-use super::rigid_back::RigidBackward;
 use super::gradient::{DeformableGradient, MaterialGradient, RigidBodyGradient};
 use super::loss::{DeformableLoss, Seed};
 use super::record::StepRecord;
+use super::rigid_back::RigidBackward;
 use super::tape::DeformableTape;
 use crate::error::{BodyError, DeformableBodyError};
 use crate::fem::DeformableModel;

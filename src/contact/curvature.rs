@@ -47,7 +47,11 @@ pub(crate) fn curvature(obstacle: &Obstacle, point: &Vec3, normal: &Vec3) -> Mat
             let distance = beyond.map(|b| b.max(0.0)).norm();
             // Over a face nothing is left of it.
             let around = Mat3::identity() - flat;
-            if distance > 0.0 && beyond.iter().filter(|b| **b > 0.0).count() > 1 { around / distance } else { Mat3::zeros() }
+            if distance > 0.0 && beyond.iter().filter(|b| **b > 0.0).count() > 1 {
+                around / distance
+            } else {
+                Mat3::zeros()
+            }
         }
         _ => Mat3::zeros(),
     }
