@@ -1,9 +1,10 @@
 //! Derivatives of a loss over steps.
 
-use crate::arrays::{Array1, Array2, grid, image, rows};
-use crate::handles::PyCableHandle;
+use crate::arrays::{Array1, Array2, grid, image, rows, triple};
+use crate::handles::{PyCableHandle, PyRigidBodyHandle};
 use foible3d::{
-    CableGradient, DeformableGradient, MaterialGradient, StepGradient, WindGradient, WovenGradient,
+    CableGradient, DeformableGradient, MaterialGradient, RigidStepGradient, StepGradient, WindGradient,
+    WovenGradient,
 };
 use numpy::{PyArray1, PyArray3};
 use pyo3::prelude::*;
@@ -181,6 +182,32 @@ impl PyGradient {
     #[getter]
     fn wind_friction<'py>(&self, py: Python<'py>) -> Array1<'py> {
         self.of_wind(py, |wind| wind.friction)
+    }
+
+    /// With respect to the rigid bodies of the tape, by their handles; of a tape of several deformable bodies they are with the first. Dicts: arrays
+    /// of shape (3,) ``initial_position`` of the centre of mass [1/m], ``initial_rotation`` about axes of the world [1/rad], ``initial_linvel`` and
+    /// ``initial_angvel``; ``mass`` [1/kg], with the inertia in proportion; arrays of shape (steps, 3) ``forces`` [1/N], ``torques``, ``gravity``, and
+    /// ``linvels`` and ``angvels``, per velocity that it would have gained before the step.
+    #[getter]
+    fn rigid_bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let by_body = PyDict::new(py);
+        for gradient in &self.0.rigid_bodies {
+            let found = PyDict::new(py);
+            found.set_item("initial_position", triple(py, gradient.initial_position))?;
+            found.set_item("initial_rotation", triple(py, gradient.initial_rotation))?;
+            found.set_item("initial_linvel", triple(py, gradient.initial_linvel))?;
+            found.set_item("initial_angvel", triple(py, gradient.initial_angvel))?;
+            found.set_item("mass", gradient.mass)?;
+            let by_step =
+                |of: fn(&RigidStepGradient) -> [f64; 3]| rows(py, gradient.steps.iter().map(of).collect());
+            found.set_item("forces", by_step(|step| step.force)?)?;
+            found.set_item("torques", by_step(|step| step.torque)?)?;
+            found.set_item("gravity", by_step(|step| step.gravity)?)?;
+            found.set_item("linvels", by_step(|step| step.linvel)?)?;
+            found.set_item("angvels", by_step(|step| step.angvel)?)?;
+            by_body.set_item(PyRigidBodyHandle(gradient.body), found)?;
+        }
+        Ok(by_body)
     }
 
     fn __repr__(&self) -> String {

@@ -3,7 +3,7 @@
 use crate::arrays::{Array1, count, triple};
 use crate::errors::{Failure, bad_value, without_panic};
 use crate::gradient::PyGradient;
-use crate::handles::{PyColliderHandle, PyDeformableHandle};
+use crate::handles::{PyColliderHandle, PyDeformableHandle, PyRigidBodyHandle};
 use crate::tape_loss::{Recorded, Seeds};
 use crate::world::{Inner, World, here, in_turns, step_with};
 use foible3d::{DeformableGradient, DeformableLoss, DeformableTape, DeformableWorld};
@@ -29,6 +29,7 @@ pub struct PyTape {
     tape: Mutex<Arc<DeformableTape>>,
     has_checkpoints: bool,
     bodies: Vec<PyDeformableHandle>,
+    rigid_bodies: Vec<PyRigidBodyHandle>,
     vertices: Vec<usize>,
 }
 
@@ -60,7 +61,8 @@ impl PyTape {
     }
 
     fn recorded(&self, py: Python<'_>) -> Recorded<'_> {
-        Recorded { bodies: &self.bodies, vertices: &self.vertices, steps: self.lock(py).len() }
+        let steps = self.lock(py).len();
+        Recorded { bodies: &self.bodies, rigid_bodies: &self.rigid_bodies, vertices: &self.vertices, steps }
     }
 
     /// A step by Python's number, and a force in it.
@@ -85,9 +87,16 @@ impl PyTape {
 #[pymethods]
 impl PyTape {
     /// An empty tape of a body of a world, or of a list of bodies, which keeps all of its steps, or the world every `checkpoint_every` steps and the steps since.
+    /// `rigid_bodies`: dynamic ones that they touch, and nothing else does.
     #[new]
-    #[pyo3(signature = (world, body, checkpoint_every = None))]
-    fn new(py: Python<'_>, world: Py<World>, body: Bodies, checkpoint_every: Option<i64>) -> PyResult<Self> {
+    #[pyo3(signature = (world, body, checkpoint_every = None, rigid_bodies = Vec::new()))]
+    fn new(
+        py: Python<'_>,
+        world: Py<World>,
+        body: Bodies,
+        checkpoint_every: Option<i64>,
+        rigid_bodies: Vec<PyRigidBodyHandle>,
+    ) -> PyResult<Self> {
         let every = checkpoint_every.map(|every| count("checkpoint_every", every)).transpose()?;
         if every == Some(0) {
             return Err(bad_value("checkpoint_every is 0, but must be at least 1".into()));
@@ -95,7 +104,9 @@ impl PyTape {
         let Bodies(bodies) = body;
         let made = world.get().with(py, |inner| {
             let handles: Vec<_> = bodies.iter().map(|body| body.0).collect();
+            let rigid: Vec<_> = rigid_bodies.iter().map(|body| body.0).collect();
             let tape = DeformableTape::of_bodies(&inner.deformables, &handles).map_err(Failure::from)?;
+            let tape = tape.with_rigid_bodies(&inner.physics, &rigid).map_err(Failure::from)?;
             let count = |handle| inner.deformables.bodies[handle].vertex_count();
             Ok::<_, Failure>((tape, handles.into_iter().map(count).collect()))
         })?;
@@ -104,7 +115,7 @@ impl PyTape {
             tape = tape.checkpoint_every(every);
         }
         let (tape, has_checkpoints) = (Mutex::new(Arc::new(tape)), every.is_some());
-        Ok(Self { world, tape, has_checkpoints, bodies, vertices })
+        Ok(Self { world, tape, has_checkpoints, bodies, rigid_bodies, vertices })
     }
 
     /// Steps the world `n` times and records the steps. A step that has no gradient raises `DeformableBodyError`: the world has taken it.
@@ -144,6 +155,12 @@ impl PyTape {
         self.bodies.clone()
     }
 
+    /// Handles of the rigid bodies, in the order in which they were named.
+    #[getter]
+    fn rigid_bodies(&self) -> Vec<PyRigidBodyHandle> {
+        self.rigid_bodies.clone()
+    }
+
     /// Force of a collider on the body in a step [N], an array of shape (3,), in the solver's precision; with checkpoints of steps since the last one.
     /// A tape of several bodies has to be told on which.
     #[pyo3(signature = (step, collider, body = None))]
@@ -174,11 +191,14 @@ impl PyTape {
     /// The derivatives of a loss, given by its own with respect to what it looks at: `positions` [1/m] and `velocities` [s/m] of the vertices at the
     /// end of steps, dicts of arrays of shape (n, 3) by the number of the step, from the end if negative; `contact_forces` [1/N], a dict of
     /// three numbers by pairs of a step and the handle of a collider; `tensions` [1/N], a dict of numbers by pairs of a step and the handle of a cable.
-    /// Keys may name the body at their end, as those of ``backward_all``.
+    /// Keys may name the body at their end, as those of ``backward_all``. `rigid_bodies`, a dict by pairs of a step and the handle of a rigid body of the
+    /// tape, holds dicts of three numbers: ``position`` of the centre of mass [1/m], ``rotation`` about axes of the world [1/rad], ``linvel`` [s/m] and
+    /// ``angvel`` [s/rad].
     ///
     /// Of a tape with checkpoints `control(step, world)` has to do to a copy of the world, before each step but those after a checkpoint, what was
     /// done to it then; not needed where nothing was.
-    #[pyo3(signature = (positions = None, velocities = None, contact_forces = None, tensions = None, control = None))]
+    #[pyo3(signature = (positions = None, velocities = None, contact_forces = None, tensions = None, control = None, rigid_bodies = None))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
     fn backward(
         &self,
         py: Python<'_>,
@@ -187,19 +207,20 @@ impl PyTape {
         contact_forces: Option<Bound<'_, PyDict>>,
         tensions: Option<Bound<'_, PyDict>>,
         control: Option<Py<PyAny>>,
+        rigid_bodies: Option<Bound<'_, PyDict>>,
     ) -> PyResult<PyGradient> {
         if self.bodies.len() > 1 {
             return Err(bad_value("the tape is of several bodies: see backward_all".into()));
         }
         let forces = [contact_forces, None, tensions];
-        let gradients = self.gradients(py, [positions, velocities], &forces, control)?;
+        let gradients = self.gradients(py, [positions, velocities, rigid_bodies], &forces, control)?;
         Ok(PyGradient(gradients.into_iter().next().expect("a tape has a body")))
     }
 
     /// As ``backward``, with respect to every body of the tape: a dict by their handles. Where the tape is of several, keys name the body too, at
     /// their end: ``(step, body)``, ``(step, collider, body)``, ``(step, cable, body)``. `body_forces` [1/N], a dict of three numbers by ``(step, body,
     /// other)``, is of the force of another body of the tape on one of it.
-    #[pyo3(signature = (positions = None, velocities = None, contact_forces = None, body_forces = None, tensions = None, control = None))]
+    #[pyo3(signature = (positions = None, velocities = None, contact_forces = None, body_forces = None, tensions = None, control = None, rigid_bodies = None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
     fn backward_all<'py>(
         &self,
@@ -210,9 +231,10 @@ impl PyTape {
         body_forces: Option<Bound<'py, PyDict>>,
         tensions: Option<Bound<'py, PyDict>>,
         control: Option<Py<PyAny>>,
+        rigid_bodies: Option<Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let forces = [contact_forces, body_forces, tensions];
-        let gradients = self.gradients(py, [positions, velocities], &forces, control)?;
+        let gradients = self.gradients(py, [positions, velocities, rigid_bodies], &forces, control)?;
         let by_body = PyDict::new(py);
         for (body, gradient) in self.bodies.iter().zip(gradients) {
             by_body.set_item(*body, PyGradient(gradient))?;
@@ -222,11 +244,11 @@ impl PyTape {
 }
 
 impl PyTape {
-    /// The way back: of derivatives of positions and velocities, and of forces of colliders, forces of bodies and tensions.
+    /// The way back: of derivatives of positions and velocities, of rigid bodies, and of forces of colliders, forces of bodies and tensions.
     fn gradients<'py>(
         &self,
         py: Python<'py>,
-        [positions, velocities]: [Option<Bound<'py, PyDict>>; 2],
+        [positions, velocities, rigid_bodies]: [Option<Bound<'py, PyDict>>; 3],
         forces: &[Option<Bound<'py, PyDict>>; 3],
         control: Option<Py<PyAny>>,
     ) -> PyResult<Vec<DeformableGradient>> {
@@ -238,6 +260,7 @@ impl PyTape {
         let recorded = self.recorded(py);
         let mut seeds = Seeds::of_vertices(&recorded, positions.as_ref(), velocities.as_ref())?;
         seeds.add_forces(&recorded, forces)?;
+        seeds.add_rigid_bodies(&recorded, rigid_bodies.as_ref())?;
         py.detach(|| {
             without_panic(|| {
                 let tape = self.lock_detached().clone();

@@ -2,7 +2,7 @@
 
 use crate::arrays::{Triple, points};
 use crate::errors::{Failure, bad_value};
-use crate::handles::{PyCableHandle, PyColliderHandle, PyDeformableHandle};
+use crate::handles::{PyCableHandle, PyColliderHandle, PyDeformableHandle, PyRigidBodyHandle};
 use foible3d::{BodyError, DeformableLoss, DeformableTape};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -35,9 +35,30 @@ impl<H> Of<H> {
 #[derive(FromPyObject)]
 struct OfPair(isize, PyDeformableHandle, PyDeformableHandle);
 
+/// A step, and a rigid body.
+#[derive(FromPyObject)]
+struct OfRigid(isize, PyRigidBodyHandle);
+
+/// What a loss may look at of a rigid body, by the names of the dict's keys.
+#[derive(Clone, Copy)]
+enum RigidPart {
+    Position,
+    Rotation,
+    Linvel,
+    Angvel,
+}
+
+const RIGID_PARTS: [(&str, RigidPart); 4] = [
+    ("position", RigidPart::Position),
+    ("rotation", RigidPart::Rotation),
+    ("linvel", RigidPart::Linvel),
+    ("angvel", RigidPart::Angvel),
+];
+
 /// The bodies of a tape, and its number of steps.
 pub struct Recorded<'a> {
     pub bodies: &'a [PyDeformableHandle],
+    pub rigid_bodies: &'a [PyRigidBodyHandle],
     pub vertices: &'a [usize],
     pub steps: usize,
 }
@@ -94,6 +115,7 @@ pub struct Seeds {
     contact_forces: Vec<([usize; 2], PyColliderHandle, [f64; 3])>,
     body_forces: Vec<([usize; 2], PyDeformableHandle, [f64; 3])>,
     tensions: Vec<([usize; 2], PyCableHandle, f64)>,
+    rigid_bodies: Vec<(usize, PyRigidBodyHandle, RigidPart, [f64; 3])>,
 }
 
 impl Seeds {
@@ -136,6 +158,32 @@ impl Seeds {
         Ok(())
     }
 
+    /// Derivatives with respect to rigid bodies: dicts by what they are of.
+    pub fn add_rigid_bodies(
+        &mut self,
+        recorded: &Recorded<'_>,
+        given: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<()> {
+        for (key, parts) in pairs(given, "rigid_bodies")? {
+            let OfRigid(step, body) = key_of(&key, "rigid_bodies", "(step, rigid body)")?;
+            let step = recorded.step(step)?;
+            if !recorded.rigid_bodies.contains(&body) {
+                return Err(bad_value("rigid_bodies: one of them is not on the tape".into()));
+            }
+            let form = "a dict with 'position', 'rotation', 'linvel' or 'angvel'";
+            let parts = parts.cast_into::<PyDict>();
+            let parts = parts.map_err(|_| PyTypeError::new_err(format!("rigid_bodies: expected {form}")))?;
+            for (name, of) in pairs(Some(&parts), "rigid_bodies")? {
+                let name: String = key_of(&name, "rigid_bodies", form)?;
+                let part = RIGID_PARTS.iter().find(|(own, _)| *own == name);
+                let (_, part) =
+                    part.ok_or_else(|| bad_value(format!("rigid_bodies: '{name}' is none of {form}")))?;
+                self.rigid_bodies.push((step, body, *part, value_of::<Triple>(&of, "rigid_bodies")?.0));
+            }
+        }
+        Ok(())
+    }
+
     /// The losses of a tape's bodies.
     pub fn losses(&self, tape: &DeformableTape) -> Result<Vec<DeformableLoss>, Failure> {
         let mut losses = tape.losses();
@@ -153,6 +201,15 @@ impl Seeds {
         }
         for ([step, place], cable, of) in &self.tensions {
             losses[*place].add_tension(*step, cable.0, *of)?;
+        }
+        for (step, body, part, of) in &self.rigid_bodies {
+            let (loss, body) = (&mut losses[0], body.0);
+            match part {
+                RigidPart::Position => loss.add_rigid_position(*step, body, *of)?,
+                RigidPart::Rotation => loss.add_rigid_rotation(*step, body, *of)?,
+                RigidPart::Linvel => loss.add_rigid_linvel(*step, body, *of)?,
+                RigidPart::Angvel => loss.add_rigid_angvel(*step, body, *of)?,
+            }
         }
         Ok(losses)
     }

@@ -64,6 +64,8 @@ pub(super) struct ColliderGeometry {
     place: Vec3,
     /// From there to the point of the body, at the start.
     apart: Vec3,
+    /// What a collider that is led turns by in the step, less one.
+    led: Mat3,
 }
 
 /// Derivatives of the Lagrangian with respect to a normal, the place on the collider, and the arm there.
@@ -116,7 +118,21 @@ impl ColliderGeometry {
             Kind::OnSurface { point, gap: normal.dot(&(point - place)), turn }
         };
         let apart = soft.interpolate(body.x_start) - place;
-        Some(Self { kind: kind.unwrap_or_else(on_surface), place, apart })
+        let led = match contact.is_on_prescribed {
+            true => obstacle.end.rotation * obstacle.start.rotation.transpose() - Mat3::identity(),
+            false => Mat3::zeros(),
+        };
+        Some(Self { kind: kind.unwrap_or_else(on_surface), place, apart, led })
+    }
+
+    /// Of a node that sticks with its one contact, and goes with what that is on: from what is with respect to where it ends, but along the normal if that
+    /// does not take part, to that with respect to where it began.
+    pub fn by_stuck(&self, contact: &ContactRecord, carried: &Vec3) -> Vec3 {
+        let Kind::OnSurface { gap, turn, .. } = &self.kind else { return Vec3::zeros() };
+        let [normal, ..] = &contact.frame;
+        let by_place = self.led.tr_mul(carried);
+        let along = by_place - normal * normal.dot(&by_place);
+        turn * (carried * normal.dot(&contact.motion) - by_place * *gap) + along
     }
 
     /// Adds it, with what z, q and the loss of its force say of a contact, and the turn of its partner's body in the step.
@@ -127,7 +143,7 @@ impl ColliderGeometry {
         (of_force, partner_turn): (&Vec3, &Vec3),
         out: &mut OfPlaces<'_>,
     ) {
-        let of = OfGeometry::new(contact, (z, q), (of_force, partner_turn), &self.apart);
+        let of = OfGeometry::new(contact, (z, q), (of_force, partner_turn), self);
         out.com -= of.arm;
         let of_weights = |nodes: &[Node]| -> Vec<f64> {
             let of_weight = |node: &Node| {
@@ -199,7 +215,7 @@ impl OfGeometry {
         contact: &ContactRecord,
         (z, q): (&[Vec3], &[f64]),
         (of_force, partner_turn): (&Vec3, &Vec3),
-        apart: &Vec3,
+        ColliderGeometry { apart, led, .. }: &ColliderGeometry,
     ) -> Self {
         let [normal, tangents @ ..] = &contact.frame;
         let (force, motion) = (contact.force, contact.motion);
@@ -215,7 +231,8 @@ impl OfGeometry {
         });
         // What an overlap that is not recovered at once says of the place, its motion says already.
         let of_gap = if contact.recovers { Vec3::zeros() } else { normal * -q[0] };
-        Self { normal: of_normal, place: of_gap + arm, arm, looks }
+        let of_led = led.tr_mul(&(normal * q[0] + looks));
+        Self { normal: of_normal, place: of_gap + arm - of_led, arm, looks }
     }
 
     fn said(&self, normal: &Vec3, place: &Vec3) -> f64 {

@@ -161,6 +161,9 @@ impl<'a> Joint<'a> {
             let normal = contact.frame[0];
             let along = normal * normal.dot(&carried);
             of_start[node] += if contact.recovers { carried } else { carried - along };
+            if let Some(geometry) = &contact.on_collider {
+                of_start[node] += geometry.by_stuck(contact, &carried);
+            }
         }
     }
 

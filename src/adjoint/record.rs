@@ -162,7 +162,7 @@ impl StepRecord {
     /// Where it has led the bodies.
     pub fn led_to(&self) -> Vec<Vec3> {
         let nodes = self.bodies.iter().flat_map(|body| body.x_end.iter().copied());
-        nodes.chain(self.rigid_bodies.iter().map(|body| body.end.com)).collect()
+        nodes.chain(self.rigid_bodies.iter().flat_map(RigidRecord::led_to)).collect()
     }
 
     /// Of each body its nodes among those of all.

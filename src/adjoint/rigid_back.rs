@@ -68,8 +68,10 @@ impl RigidBackward {
                 (of.linvel * h, of.angvel * h, impulse / h)
             }
         };
-        // The inertia turns with the body: δI⁻¹ = [δφ] I⁻¹ − I⁻¹ [δφ].
-        of.turn += (inv_inertia * moment).cross(&angular) - moment.cross(&(inv_inertia * angular));
+        // The inertia turns with the body, δI⁻¹ = [δφ] I⁻¹ − I⁻¹ [δφ]; locked axes, those of the world, do not.
+        let (along, whole) = (|v: &Vec3| v.component_mul(&load.turns), &load.whole_inv_inertia);
+        let (free_moment, free_angular) = (along(&moment), along(&angular));
+        of.turn += (whole * free_moment).cross(&free_angular) - free_moment.cross(&(whole * free_angular));
         of.com += by_place[0];
         of.turn += by_place[1];
         let gained = match record.torque_impulse {

@@ -154,7 +154,7 @@ mod tests {
             angular_acceleration: load.inv_inertia * load.torque,
             load,
         };
-        (flight, RigidState::of(body))
+        (flight, RigidState::of(physics, body))
     }
 
     #[test]
@@ -165,7 +165,7 @@ mod tests {
             let ours = flight.end(&start);
             physics.step();
             let body = &physics.bodies[handle];
-            let theirs = RigidState::of(body);
+            let theirs = RigidState::of(&physics, body);
             // f32 of velocities of up to 8 and positions below 1, over four substeps.
             assert!((ours.linvel - from_real(body.linvel())).norm() < 1e-6);
             assert!(

@@ -2,7 +2,7 @@
 
 use super::contact_record::ContactRecord;
 use super::rigid_flight::Flight;
-use crate::coupling::{RigidLoad, RigidState, free_rigid_body};
+use crate::coupling::{RigidLoad, RigidState, free_rigid_body, is_held_by_rapier};
 use crate::math::{Vec3, rotation_vector};
 use crate::pipeline::DeformableWorld;
 use crate::solver::Reaction;
@@ -40,7 +40,7 @@ impl RigidStart {
     /// `None` if it is none that moves by itself.
     pub fn of(physics: &PhysicsWorld, handle: RigidBodyHandle) -> Option<Self> {
         let body = free_rigid_body(physics, handle)?;
-        let (state, load) = (RigidState::of(body), RigidLoad::of(physics, body));
+        let (state, load) = (RigidState::of(physics, body), RigidLoad::of(physics, body));
         Some(Self { state, load, sleeps: body.is_sleeping() })
     }
 
@@ -67,6 +67,9 @@ impl RigidRecord {
         let (h, state, load) = (f64::from(parameters.dt), start.state, start.load);
         let reaction = deformables.pipeline.reaction_on(handle);
         check_contacts(reaction.as_ref(), contacts, &state.com, h)?;
+        if is_held_by_rapier(physics, handle) {
+            return Err(MOVED_BY_OTHERS);
+        }
         let gained =
             [load.inv_mass.component_mul(&load.force) + load.falls(), load.inv_inertia * load.torque];
         let mut flight_from = state;
@@ -83,15 +86,28 @@ impl RigidRecord {
             (flight.acceleration, flight.angular_acceleration) = (Vec3::zeros(), Vec3::zeros());
         }
         let torque_impulse = reaction.map(|reaction| reaction.torque_impulse + load.torque * h);
-        let end = RigidState::of(body);
+        let end = RigidState::of(physics, body);
         let record = Self { start: state, flight_from, flight, end, torque_impulse };
         if record.went_elsewhere() { Err(MOVED_BY_OTHERS) } else { Ok(record) }
+    }
+
+    /// Its radius of gyration, about \[m\].
+    fn size(&self) -> f64 {
+        let load = &self.flight.load;
+        (load.mass * load.whole_inv_inertia.trace() / 3.0).max(f64::MIN_POSITIVE).sqrt().recip()
+    }
+
+    /// Where it has been led, how it is turned and how it goes on, in metres.
+    pub fn led_to(&self) -> [Vec3; 5] {
+        let (end, h, size) = (&self.end, self.flight.h, self.size());
+        let axis = |k: usize| end.rotation.column(k) * size;
+        [end.com, axis(0), axis(1), end.linvel * h, end.angvel * (h * size)]
     }
 
     /// Whether rapier has led it elsewhere than what is known of it does.
     fn went_elsewhere(&self) -> bool {
         let (h, end, load) = (self.flight.h, self.flight.end(&self.flight_from), &self.flight.load);
-        let size = (load.mass * load.inv_inertia.trace() / 3.0).max(f64::MIN_POSITIVE).sqrt().recip();
+        let size = self.size();
         let fastest = |state: &RigidState| state.linvel.norm() + size * state.angvel.norm();
         let velocity =
             fastest(&self.start) + fastest(&self.flight_from) + fastest(&self.end) + load.gravity.norm() * h;
@@ -116,6 +132,7 @@ fn check_contacts<'a>(
     let (mut impulse, mut torque_impulse) = (impulse, torque_impulse);
     // All forces, and their moments, whatever they sum to.
     let (mut forces, mut moments) = (0.0, 0.0);
+    let all = reaction.map_or(0.0, |reaction| reaction.pushed);
     for contact in contacts {
         let arm = contact.rigid.map_or(Vec3::zeros(), |rigid| rigid.point - com);
         impulse += contact.force * h;
@@ -124,6 +141,7 @@ fn check_contacts<'a>(
         moments += arm.norm() * contact.force.norm() * h;
     }
     let is_all = impulse.norm() <= ALL * forces && torque_impulse.norm() <= ALL * moments;
+    let is_all = is_all && (all - forces).abs() <= ALL * forces;
     if is_all { Ok(()) } else { Err(MOVED_BY_OTHERS) }
 }
 

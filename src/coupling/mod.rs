@@ -52,6 +52,6 @@ pub use parts::PhysicsParts;
 pub(crate) use parts::{RapierSets, StepContext, body_handle, collider_handle, impulse_joint_handle, packed};
 pub use query_colliders::DeformableColliders;
 pub(crate) use reactions::Reactions;
-pub(crate) use rigid_state::{RigidLoad, RigidState, free_rigid_body};
+pub(crate) use rigid_state::{RigidLoad, RigidState, free_rigid_body, is_held_by_rapier};
 pub(crate) use scene::RapierScene;
 pub(crate) use twists::{note_twist, place_twists, twist_constraints};

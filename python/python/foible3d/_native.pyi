@@ -1246,15 +1246,22 @@ _RowsByStep = Union[Dict[int, PointsLike], Dict[Tuple[int, DeformableBodyHandle]
 _ForcesByCollider = Union[
     Dict[Tuple[int, ColliderHandle], VectorLike], Dict[Tuple[int, ColliderHandle, DeformableBodyHandle], VectorLike]
 ]
+_RigidBodies = Dict[Tuple[int, RigidBodyHandle], Dict[str, VectorLike]]
 _TensionsByCable = Union[Dict[Tuple[int, CableHandle], float], Dict[Tuple[int, CableHandle, DeformableBodyHandle], float]]
 
 @final
 class Tape:
     def __init__(
-        self, world: World, body: Union[DeformableBodyHandle, Sequence[DeformableBodyHandle]], checkpoint_every: Optional[int] = None
+        self,
+        world: World,
+        body: Union[DeformableBodyHandle, Sequence[DeformableBodyHandle]],
+        checkpoint_every: Optional[int] = None,
+        rigid_bodies: Sequence[RigidBodyHandle] = (),
     ) -> None: ...
     @property
     def bodies(self) -> List[DeformableBodyHandle]: ...
+    @property
+    def rigid_bodies(self) -> List[RigidBodyHandle]: ...
     def step(self, n: int = 1) -> None: ...
     def __len__(self) -> int: ...
     def clear(self) -> None: ...
@@ -1267,6 +1274,7 @@ class Tape:
         contact_forces: Optional[_ForcesByCollider] = None,
         tensions: Optional[_TensionsByCable] = None,
         control: Optional[Callable[[int, World], object]] = None,
+        rigid_bodies: Optional[_RigidBodies] = None,
     ) -> Gradient: ...
     def backward_all(
         self,
@@ -1276,6 +1284,7 @@ class Tape:
         body_forces: Optional[Dict[Tuple[int, DeformableBodyHandle, DeformableBodyHandle], VectorLike]] = None,
         tensions: Optional[_TensionsByCable] = None,
         control: Optional[Callable[[int, World], object]] = None,
+        rigid_bodies: Optional[_RigidBodies] = None,
     ) -> Dict[DeformableBodyHandle, Gradient]: ...
 
 @final
@@ -1316,6 +1325,8 @@ class Gradient:
     def wind_drag(self) -> Reals: ...
     @property
     def wind_friction(self) -> Reals: ...
+    @property
+    def rigid_bodies(self) -> Dict[RigidBodyHandle, Dict[str, Union[float, Reals]]]: ...
 
 def step_all(worlds: Sequence[World], n: int = 1, threads: Optional[int] = None) -> None: ...
 

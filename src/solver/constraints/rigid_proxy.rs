@@ -59,6 +59,8 @@ pub(crate) struct Reaction {
     pub impulse: Vec3,
     /// About the centre of mass [N m s].
     pub torque_impulse: Vec3,
+    /// Sum of the magnitudes of all forces and moments over the step \[N s\], \[N m s\].
+    pub pushed: f64,
     pub touched: bool,
 }
 
@@ -269,6 +271,7 @@ impl RigidProxies {
         let proxy = self.get(id);
         if proxy.yields() {
             let reaction = &mut reactions[id.0 as usize];
+            reaction.pushed += force.norm() * h;
             let [force, moment] = proxy.wrench(endpoint, force);
             reaction.touched = true;
             reaction.impulse += force * h;
