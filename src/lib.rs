@@ -146,9 +146,9 @@ pub mod prelude {
         DeformableStress, DeformableSurfaceMesh, DeformableSurfacePoint, DeformableTape, DeformableWind,
         DeformableWorld, DepthCamera, Elasticity, FactorPrecision, Fidelity, Frames, InsertedRegion,
         Integrator, JointForce, JointMotorAxis, JointRole, MaterialGradient, MaxwellBranch, OrthotropicSheet,
-        PhysicsParts, RigidContact, RigidRegion, RigidRegionBody, SolvedJoint, Solver, SolverSettings,
-        StepGradient, Structure, SurfaceMesh, SurfaceRepair, SystemMatrix, TactilePad, TactileReading,
-        TetMesh, WindGradient, WovenGradient,
+        PhysicsParts, RigidBodyGradient, RigidContact, RigidRegion, RigidRegionBody, RigidStepGradient,
+        SolvedJoint, Solver, SolverSettings, StepGradient, Structure, SurfaceMesh, SurfaceRepair,
+        SystemMatrix, TactilePad, TactileReading, TetMesh, WindGradient, WovenGradient,
     };
     #[cfg(feature = "debug-render")]
     pub use crate::{DeformableDebugRenderPipeline, DeformableDebugRenderStyle};

@@ -158,54 +158,72 @@ impl ColliderGeometry {
             };
             nodes.iter().map(of_weight).collect()
         };
-        match &self.kind {
-            Kind::OnSurface { point, gap, turn } => {
-                let [normal, ..] = &contact.frame;
-                let along = Mat3::identity() - normal * normal.transpose();
-                let of_slide = turn * of.normal + (along - turn * *gap) * of.place;
-                contact.nodes.iter().for_each(|(node, weight)| out.nodes[*node] += of_slide * *weight);
-                out.add_point(contact, &self.place, &of.place);
-                out.add_point(contact, point, &-of_slide);
-                out.turn += normal.cross(&of.normal);
+        if let Kind::OnSurface { point, gap, turn } = &self.kind {
+            let [normal, ..] = &contact.frame;
+            let along = Mat3::identity() - normal * normal.transpose();
+            let of_slide = turn * of.normal + (along - turn * *gap) * of.place;
+            contact.nodes.iter().for_each(|(node, weight)| out.nodes[*node] += of_slide * *weight);
+            out.add_point(contact, &self.place, &of.place);
+            out.add_point(contact, point, &-of_slide);
+            out.turn += normal.cross(&of.normal);
+            return;
+        }
+        let (nodes, carried) = self.kind.follows_from();
+        let of_weights = of_weights(nodes);
+        out.add_by_differences(contact, nodes, &carried, &|x| {
+            let Touch { normal, place, weights } = self.kind.touch(x)?;
+            let of_weights = weights.iter().zip(&of_weights).map(|(weight, of)| weight * of);
+            Some(of.normal.dot(&normal) + of.place.dot(&place) + of_weights.sum::<f64>())
+        });
+    }
+}
+
+/// The normal of a contact, its place on the collider, and the weights of nodes.
+struct Touch {
+    normal: Vec3,
+    place: Vec3,
+    weights: [f64; 3],
+}
+
+impl Kind {
+    /// The nodes, and points of the collider after them, that it follows from.
+    fn follows_from(&self) -> (&[Node], Vec<Vec3>) {
+        match self {
+            Self::OnSurface { .. } => (&[], Vec::new()),
+            Self::OnTriangle { nodes, centre, .. } => (nodes, vec![*centre]),
+            Self::Edges { nodes, edge, .. } => (nodes, edge.to_vec()),
+            Self::UnderRim { nodes, rim } => (nodes, rim.to_vec()),
+            Self::EdgeOnCorner { nodes, corner, .. } => (nodes, vec![*corner]),
+        }
+    }
+
+    /// How these touch at other places.
+    fn touch(&self, x: &[Vec3]) -> Option<Touch> {
+        let along_edge = |s: f64| [1.0 - s, s, 0.0];
+        match (self, x) {
+            (Self::OnTriangle { radius, sign, .. }, [a, b, c, centre]) => {
+                let corners = [*a, *b, *c];
+                let normal = normal_of(&corners)? * *sign;
+                let weights = barycentric(&corners, centre)?;
+                Some(Touch { normal, place: centre + normal * *radius, weights })
             }
-            Kind::OnTriangle { nodes, centre, radius, sign } => {
-                let of_weights = Vec3::from_row_slice(&of_weights(nodes));
-                out.add_by_differences(contact, nodes, &[*centre], &|x| {
-                    let corners = [x[0], x[1], x[2]];
-                    let normal = normal_of(&corners)? * *sign;
-                    let weights = Vec3::from(barycentric(&corners, &x[3])?);
-                    Some(of.said(&normal, &(x[3] + normal * *radius)) + of_weights.dot(&weights))
-                });
+            (Self::Edges { sign, .. }, [a, b, p, q]) => {
+                let x = [*a, *b, *p, *q];
+                let [s, t] = places_at(0.0, &x, &x);
+                Some(Touch { normal: across(&x)? * *sign, place: p + (q - p) * t, weights: along_edge(s) })
             }
-            Kind::Edges { nodes, edge, sign } => {
-                let of_weights = of_weights(nodes);
-                out.add_by_differences(contact, nodes, edge, &|x| {
-                    let x: [Vec3; 4] = x.try_into().ok()?;
-                    let normal = across(&x)? * *sign;
-                    let [s, t] = places_at(0.0, &x, &x);
-                    let place = x[2] + (x[3] - x[2]) * t;
-                    Some(of.said(&normal, &place) + of_weights[0] * (1.0 - s) + of_weights[1] * s)
-                });
+            (Self::UnderRim { .. }, [a, b, p, q, off]) => {
+                let normal = (off - p).try_normalize(0.0)?;
+                let out = (q - p).cross(&normal);
+                let s = out.dot(&(p - a)) / out.dot(&(b - a));
+                let at = a + (b - a) * s;
+                Some(Touch { normal, place: at - normal * normal.dot(&(at - p)), weights: along_edge(s) })
             }
-            Kind::EdgeOnCorner { nodes, corner, shift } => {
-                let of_weights = of_weights(&nodes[..2]);
-                out.add_by_differences(contact, nodes, &[*corner], &|x| {
-                    let (normal, s) = shift.across(&[x[0], x[1], x[2]], &x[3])?;
-                    Some(of.said(&normal, &x[3]) + of_weights[0] * (1.0 - s) + of_weights[1] * s)
-                });
+            (Self::EdgeOnCorner { shift, .. }, [a, b, c, corner]) => {
+                let (normal, s) = shift.across(&[*a, *b, *c], corner)?;
+                Some(Touch { normal, place: *corner, weights: along_edge(s) })
             }
-            Kind::UnderRim { nodes, rim } => {
-                let of_weights = of_weights(nodes);
-                out.add_by_differences(contact, nodes, rim, &|x| {
-                    let [a, b, p, q, off] = x else { return None };
-                    let normal = (off - p).try_normalize(0.0)?;
-                    let out_of_face = (q - p).cross(&normal);
-                    let s = out_of_face.dot(&(p - a)) / out_of_face.dot(&(b - a));
-                    let at = a + (b - a) * s;
-                    let place = at - normal * normal.dot(&(at - p));
-                    Some(of.said(&normal, &place) + of_weights[0] * (1.0 - s) + of_weights[1] * s)
-                });
-            }
+            _ => None,
         }
     }
 }
@@ -233,10 +251,6 @@ impl OfGeometry {
         let of_gap = if contact.recovers { Vec3::zeros() } else { normal * -q[0] };
         let of_led = led.tr_mul(&(normal * q[0] + looks));
         Self { normal: of_normal, place: of_gap + arm - of_led, arm, looks }
-    }
-
-    fn said(&self, normal: &Vec3, place: &Vec3) -> f64 {
-        self.normal.dot(normal) + self.place.dot(place)
     }
 }
 

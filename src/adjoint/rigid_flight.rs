@@ -121,7 +121,7 @@ mod tests {
     use super::*;
     use crate::coupling::free_rigid_body;
     use crate::math::from_real;
-    use rapier3d::prelude::*;
+    use rapier3d::prelude::{ColliderBuilder, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, Vector};
 
     /// A slab that spins about no axis of its own, damped, under a force and a torque.
     fn spinning(gyroscopic: bool) -> (PhysicsWorld, RigidBodyHandle) {

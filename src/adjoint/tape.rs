@@ -129,6 +129,26 @@ impl DeformableTape {
     /// Losses may be of them ([`DeformableLoss::add_rigid_position`]), and gradients are with respect to them
     /// ([`DeformableGradient::rigid_bodies`](crate::DeformableGradient::rigid_bodies)). Steps that were recorded before are forgotten.
     ///
+    /// ```
+    /// use foible3d::prelude::*;
+    /// use rapier3d::prelude::*;
+    /// let (mut physics, mut deformables) = (PhysicsWorld::new(), DeformableWorld::new());
+    /// let block = DeformableBodyBuilder::cuboid(Vector::splat(0.125), [2, 2, 2]).fidelity(Fidelity::Reference);
+    /// let block = deformables.insert(block.pinned(|x| x.y < -0.12).can_sleep(false))?;
+    /// let plate = RigidBodyBuilder::dynamic().translation(Vector::Y * 0.157).can_sleep(false);
+    /// let (plate, _) = physics.insert(plate, ColliderBuilder::cuboid(0.25, 0.03, 0.25).density(200.0));
+    /// let mut tape = DeformableTape::new(&deformables, block)?.with_rigid_bodies(&physics, &[plate])?;
+    /// for _ in 0..10 {
+    ///     tape.step(&mut physics, &mut deformables)?;
+    /// }
+    /// let mut loss = tape.loss();
+    /// loss.add_rigid_position(9, plate, [0.0, 1.0, 0.0])?;
+    /// let gradient = tape.backward(&loss)?;
+    /// // On a stiffer block the plate lies higher, a heavier one lower.
+    /// assert!(gradient.material().youngs_modulus > 0.0 && gradient.rigid_bodies[0].mass < 0.0);
+    /// # Ok::<(), DeformableBodyError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`BodyError::NoGradient`] if one is named twice, is not there, not dynamic, not enabled, or part of a multibody.
     pub fn with_rigid_bodies(
