@@ -15,3 +15,4 @@ mod of_twist;
 mod of_weave;
 mod of_wind;
 mod on_rigid_bodies;
+mod with_rigid_bodies;
