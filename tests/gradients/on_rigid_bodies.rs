@@ -88,8 +88,18 @@ fn turned(body: &RigidBody, vector: [f64; 3]) -> Vector3<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)) * Vector3::from(vector)
 }
 
+/// What a run begins with.
+struct Start {
+    physics: PhysicsWorld,
+    world: DeformableWorld,
+    soft: DeformableBodyHandle,
+    rigid: RigidBodyHandle,
+    collider: ColliderHandle,
+    shifted: usize,
+}
+
 impl Scene {
-    fn run(&self, run: &Run) -> Outcome {
+    fn start(&self, run: &Run) -> Start {
         let [modulus, density, heaviness, gravity, friction, along, down, spin, x, y, turn, low, lead] =
             run.values;
         let mut physics = PhysicsWorld::new();
@@ -124,6 +134,11 @@ impl Scene {
         for vertex in body.pinned().collect::<Vec<_>>() {
             body.set_pin_velocity(vertex, Vector::new(lead as f32, 0.0, 0.5 * lead as f32)).unwrap();
         }
+        Start { physics, world, soft, rigid, collider, shifted }
+    }
+
+    fn run(&self, run: &Run) -> Outcome {
+        let Start { mut physics, mut world, soft, rigid, collider, shifted } = self.start(run);
         let tape = DeformableTape::new(&world, soft).unwrap();
         let mut tape = tape.with_rigid_bodies(&physics, &[rigid]).unwrap();
         let (mut loss, mut states) = (0.0, Vec::new());
@@ -155,7 +170,7 @@ impl Scene {
             of_loss.add_rigid_angvel(step, rigid, (0.05 * a).into()).unwrap();
         }
         let force = tape.contact_force(self.look, collider);
-        let mass = f64::from(physics.bodies[rigid].mass()) / heaviness;
+        let mass = f64::from(physics.bodies[rigid].mass()) / run.values[2];
         let h = f64::from(physics.integration_parameters.dt);
         Outcome { loss, tape, of_loss, collider, mass, shifted, force, h }
     }

@@ -6,36 +6,40 @@ use crate::on_rigid_bodies::{EXACT, FELT, block};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 
-/// A pyramid that is led along drags its tip over a ball that stands: as its normals turn, so does the force.
+/// Steps of [`drag`].
+const STEPS: usize = 12;
+
+/// A pyramid that is led along and drags its tip over a ball that stands: the tape, the ball, the place of the tip, and the force on it.
+fn drag([modulus, friction, lead, shift]: [f64; 4]) -> (DeformableTape, ColliderHandle, f64, f64) {
+    let mut physics = PhysicsWorld::new();
+    let mut world = DeformableWorld::new();
+    let vertices = vec![[0.08, 0.25, 0.0], [-0.04, 0.25, -0.08], [-0.05, 0.25, 0.07], [-0.08, 0.0, 0.0]];
+    let mesh = TetMesh::new(vertices, vec![[0, 2, 1, 3]]).unwrap();
+    let material = DeformableMaterial::new(modulus, 0.3).mass_damping(1.0).friction(friction);
+    let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
+    let settings = settings.contact_tolerance(1e-12).keeps_spin(false);
+    let body = DeformableBodyBuilder::mesh(&mesh).pinned(|x| x.y > 0.2).material(material);
+    let body = world.insert(body.settings(settings).can_sleep(false)).unwrap();
+    let ball =
+        ColliderBuilder::ball(0.5).translation(Vector::new(0.02, -0.49, 0.03)).friction(friction as f32);
+    let ball = physics.insert_collider(ball, None);
+    let at = world.bodies[body].position(3).unwrap();
+    world.bodies[body].set_position(3, [at[0] + shift, at[1], at[2] - shift]).unwrap();
+    for vertex in 0..3 {
+        world.bodies[body].set_pin_velocity(vertex, Vector::new(lead as f32, 0.0, 0.0)).unwrap();
+    }
+    let mut tape = DeformableTape::new(&world, body).unwrap();
+    for _ in 0..STEPS {
+        tape.step(&mut physics, &mut world).unwrap();
+    }
+    let tip = world.bodies[body].position(3).unwrap();
+    let force = tape.contact_force(STEPS - 1, ball);
+    (tape, ball, tip[1] + 0.5 * tip[2], force[0] + force[1])
+}
+
+/// As normals turn, so does the force.
 #[test]
 fn a_tip_that_is_dragged_over_a_fixed_ball_has_gradients() {
-    const STEPS: usize = 12;
-    let drag = |[modulus, friction, lead, shift]: [f64; 4]| {
-        let mut physics = PhysicsWorld::new();
-        let mut world = DeformableWorld::new();
-        let vertices = vec![[0.08, 0.25, 0.0], [-0.04, 0.25, -0.08], [-0.05, 0.25, 0.07], [-0.08, 0.0, 0.0]];
-        let mesh = TetMesh::new(vertices, vec![[0, 2, 1, 3]]).unwrap();
-        let material = DeformableMaterial::new(modulus, 0.3).mass_damping(1.0).friction(friction);
-        let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
-        let settings = settings.contact_tolerance(1e-12).keeps_spin(false);
-        let body = DeformableBodyBuilder::mesh(&mesh).pinned(|x| x.y > 0.2).material(material);
-        let body = world.insert(body.settings(settings).can_sleep(false)).unwrap();
-        let ball =
-            ColliderBuilder::ball(0.5).translation(Vector::new(0.02, -0.49, 0.03)).friction(friction as f32);
-        let ball = physics.insert_collider(ball, None);
-        let at = world.bodies[body].position(3).unwrap();
-        world.bodies[body].set_position(3, [at[0] + shift, at[1], at[2] - shift]).unwrap();
-        for vertex in 0..3 {
-            world.bodies[body].set_pin_velocity(vertex, Vector::new(lead as f32, 0.0, 0.0)).unwrap();
-        }
-        let mut tape = DeformableTape::new(&world, body).unwrap();
-        for _ in 0..STEPS {
-            tape.step(&mut physics, &mut world).unwrap();
-        }
-        let tip = world.bodies[body].position(3).unwrap();
-        let force = tape.contact_force(STEPS - 1, ball);
-        (tape, ball, tip[1] + 0.5 * tip[2], force[0] + force[1])
-    };
     let values = [5.0e4, 0.25, 1.0, 0.0];
     let (tape, ball, ..) = drag(values);
     let (mut of_tip, mut of_force) = (tape.loss(), tape.loss());
@@ -114,43 +118,40 @@ fn what_sticks_to_what_turns_or_is_round_has_gradients() {
     }
 }
 
-/// Two pads that close on a box and lift it: how its height at the end answers to the pads' stiffness, its own weight, and how fast they rise.
+/// Two pads that close on a box and lift it, for ten steps: the tape, the box, its height at the end and its mass.
+fn lift([modulus, heaviness, gravity, rise]: [f64; 4]) -> (DeformableTape, RigidBodyHandle, f64, f64) {
+    let mut physics = PhysicsWorld::new();
+    physics.gravity = Vector::Y * gravity as f32;
+    let mut world = DeformableWorld::new();
+    let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
+    let settings = settings.contact_tolerance(1e-12).keeps_spin(false);
+    let material = DeformableMaterial::new(modulus, 0.3).mass_damping(1.0).friction(1.0);
+    let pads = [-1.0f32, 1.0].map(|side| {
+        let pad = DeformableBodyBuilder::cuboid(Vector::new(0.04, 0.05, 0.06), [2, 2, 2]);
+        let pad = pad.translation(Vector::new(side * 0.142, 0.003 * side, -0.002));
+        let pad = pad.pinned(move |x| x.x * side > 0.181).material(material);
+        world.insert(pad.can_sleep(false).settings(settings)).unwrap()
+    });
+    for (pad, side) in pads.into_iter().zip([-1.0, 1.0]) {
+        let body = &mut world.bodies[pad];
+        for vertex in body.pinned().collect::<Vec<_>>() {
+            body.set_pin_velocity(vertex, Vector::new(-side * 0.25, rise as f32, 0.0)).unwrap();
+        }
+    }
+    let rigid = RigidBodyBuilder::dynamic().can_sleep(false);
+    let collider = ColliderBuilder::cuboid(0.1, 0.08, 0.09).density(heaviness as f32).friction(1.0);
+    let (rigid, _) = physics.insert(rigid, collider);
+    let tape = DeformableTape::of_bodies(&world, &pads).unwrap();
+    let mut tape = tape.with_rigid_bodies(&physics, &[rigid]).unwrap();
+    for _ in 0..10 {
+        tape.step(&mut physics, &mut world).unwrap();
+    }
+    (tape, rigid, f64::from(physics.bodies[rigid].translation().y), f64::from(physics.bodies[rigid].mass()))
+}
+
+/// How its height answers to the pads' stiffness, its own weight, and how fast they rise.
 #[test]
 fn pads_that_lift_a_box_have_gradients() {
-    let lift = |[modulus, heaviness, gravity, rise]: [f64; 4]| {
-        let mut physics = PhysicsWorld::new();
-        physics.gravity = Vector::Y * gravity as f32;
-        let mut world = DeformableWorld::new();
-        let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
-        let settings = settings.contact_tolerance(1e-12).keeps_spin(false);
-        let material = DeformableMaterial::new(modulus, 0.3).mass_damping(1.0).friction(1.0);
-        let pads = [-1.0f32, 1.0].map(|side| {
-            let pad = DeformableBodyBuilder::cuboid(Vector::new(0.04, 0.05, 0.06), [2, 2, 2]);
-            let pad = pad.translation(Vector::new(side * 0.142, 0.003 * side, -0.002));
-            let pad = pad.pinned(move |x| x.x * side > 0.181).material(material);
-            world.insert(pad.can_sleep(false).settings(settings)).unwrap()
-        });
-        for (pad, side) in pads.into_iter().zip([-1.0, 1.0]) {
-            let body = &mut world.bodies[pad];
-            for vertex in body.pinned().collect::<Vec<_>>() {
-                body.set_pin_velocity(vertex, Vector::new(-side * 0.25, rise as f32, 0.0)).unwrap();
-            }
-        }
-        let rigid = RigidBodyBuilder::dynamic().can_sleep(false);
-        let collider = ColliderBuilder::cuboid(0.1, 0.08, 0.09).density(heaviness as f32).friction(1.0);
-        let (rigid, _) = physics.insert(rigid, collider);
-        let tape = DeformableTape::of_bodies(&world, &pads).unwrap();
-        let mut tape = tape.with_rigid_bodies(&physics, &[rigid]).unwrap();
-        for _ in 0..10 {
-            tape.step(&mut physics, &mut world).unwrap();
-        }
-        (
-            tape,
-            rigid,
-            f64::from(physics.bodies[rigid].translation().y),
-            f64::from(physics.bodies[rigid].mass()),
-        )
-    };
     let values = [1.0e5, 128.0, -9.75, 0.25];
     let (tape, rigid, height, mass) = lift(values);
     let mut losses = tape.losses();
