@@ -24,6 +24,10 @@ use nalgebra::{DMatrix, DVector};
 const REDUNDANT: f64 = 1.0e-11;
 /// What a solve of the contacts may leave of its right-hand side.
 const LEFT: f64 = 1.0e-8;
+/// Product of the largest numbers of a matrix and of its solution over the largest of the right-hand side from which on the least of all solutions is taken: what
+/// contacts that say the same add to one another cancels, but not in what follows from it. Two boxes on a block, 41 rows of which 13 say nothing new,
+/// had 1e6 of it, and a derivative of -1503 in the place of -1.6e-7.
+const GROWN: f64 = 1.0e5;
 
 /// A row: what its force acts along, and what its law looks along.
 struct Row {
@@ -191,7 +195,9 @@ fn solve_one(tangents: &mut Tangents<'_>, g: &mut [Vec3]) -> bool {
 /// By elimination, or, where contacts are as good as redundant, by the least solution of all.
 fn solve_dense(matrix: DMatrix<f64>, rhs: &DVector<f64>) -> Option<DVector<f64>> {
     let left = |q: &DVector<f64>| (&matrix * q - rhs).amax();
-    let by_elimination = matrix.clone().lu().solve(rhs).filter(|q| left(q) <= LEFT * rhs.amax());
+    let is_small = |q: &DVector<f64>| matrix.amax() * q.amax() <= GROWN * rhs.amax();
+    let by_elimination =
+        matrix.clone().lu().solve(rhs).filter(|q| left(q) <= LEFT * rhs.amax() && is_small(q));
     by_elimination.or_else(|| {
         let svd = matrix.clone().svd(true, true);
         let q = svd.solve(rhs, REDUNDANT * svd.singular_values.max()).ok()?;

@@ -322,7 +322,7 @@ fn a_box_on_a_block_has_gradients() {
 }
 
 /// Four pyramids, on whose tips something round touches nothing but these.
-fn on_tips(shape: SharedShape, turn: Vector, height: f32) -> Scene {
+pub fn tips() -> DeformableBodyBuilder {
     let (mut vertices, mut tetrahedra) = (Vec::new(), Vec::new());
     for [x, z] in [[-0.15, -0.1], [0.12, -0.13], [0.14, 0.11], [-0.11, 0.14]] {
         let first = vertices.len() as u32;
@@ -332,8 +332,12 @@ fn on_tips(shape: SharedShape, turn: Vector, height: f32) -> Scene {
         tetrahedra.push([first, first + 1, first + 2, first + 3]);
     }
     let mesh = TetMesh::new(vertices, tetrahedra).unwrap();
+    DeformableBodyBuilder::mesh(&mesh)
+}
+
+fn on_tips(shape: SharedShape, turn: Vector, height: f32) -> Scene {
     let rigid = RigidBodyBuilder::dynamic().translation(Vector::new(0.02, height, 0.01)).rotation(turn);
-    Scene { soft: DeformableBodyBuilder::mesh(&mesh), shape, rigid, density: 16.0, rounding: 2e-7, ..plate() }
+    Scene { soft: tips(), shape, rigid, density: 16.0, rounding: 2e-7, ..plate() }
 }
 
 /// Around them normals turn.

@@ -2,7 +2,7 @@
 //! is done to rigid bodies between steps.
 
 use crate::differences::slopes;
-use crate::on_rigid_bodies::{EXACT, FELT, block};
+use crate::on_rigid_bodies::{EXACT, FELT, block, tips};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 
@@ -182,6 +182,60 @@ fn pads_that_lift_a_box_have_gradients() {
         // The height of some centimetres is known to 4e-9 m.
         assert!((ours[k] - slope).abs() < EXACT * slope.abs() + 4e-9 / by, "{k}: {} {slope}", ours[k]);
         assert!(4e-9 / by < FELT * slope.abs());
+    }
+}
+
+/// A plate with a ball beside its middle lands four metres from the origin, where `f32` keeps 2e-7 m of x, and another body of the tape falls freely.
+#[test]
+fn a_body_of_two_colliders_far_from_the_origin_has_gradients() {
+    let run = |[heaviness, down, spin]: [f64; 3]| {
+        let (mut physics, mut world) = (PhysicsWorld::new(), DeformableWorld::new());
+        physics.gravity = Vector::Y * -9.75;
+        let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
+        let settings = settings.contact_tolerance(1e-12).keeps_spin(false);
+        let material = DeformableMaterial::new(5.0e4, 0.3).mass_damping(1.0).friction(1.0);
+        let soft = tips().translation(Vector::X * 4.0).pinned(|x| x.y < -0.249).material(material);
+        let soft = world.insert(soft.settings(settings).can_sleep(false)).unwrap();
+        let body = RigidBodyBuilder::dynamic().translation(Vector::new(4.02, 0.051, 0.01)).can_sleep(false);
+        let body = body.linvel(Vector::Y * down as f32).angvel(Vector::Z * spin as f32);
+        let plate = ColliderBuilder::cuboid(0.5, 0.05, 0.4).density(heaviness as f32).friction(1.0);
+        let (body, _) = physics.insert(body, plate);
+        let ball = ColliderBuilder::ball(0.06).translation(Vector::new(0.03, 0.1, 0.02)).density(512.0);
+        physics.insert_collider(ball, Some(body));
+        let other = RigidBodyBuilder::dynamic().translation(Vector::Y * 5.0);
+        let (other, _) = physics.insert(other, ColliderBuilder::ball(0.1));
+        let tape = DeformableTape::new(&world, soft).unwrap();
+        let mut tape = tape.with_rigid_bodies(&physics, &[other, body]).unwrap();
+        for _ in 0..8 {
+            tape.step(&mut physics, &mut world).unwrap();
+        }
+        let height = f64::from(physics.bodies[body].center_of_mass().y);
+        (tape, [other, body], height)
+    };
+    let values = [16.0, -0.5, 0.0625];
+    let (tape, [other, body], _) = run(values);
+    let mut loss = tape.loss();
+    loss.add_rigid_position(7, body, [0.0, 1.0, 0.0]).unwrap();
+    loss.add_rigid_position(7, other, [0.0, 1.0, 0.0]).unwrap();
+    let gradient = tape.backward(&loss).unwrap();
+    let [of_other, of_body] = &gradient.rigid_bodies[..] else { panic!("two rigid bodies") };
+    // Eight steps of four substeps.
+    assert!((of_other.initial_linvel[1] - 8.0 / 60.0).abs() < 1e-6 && of_other.mass == 0.0);
+    assert!((of_other.gravity()[1] - (28.0 + 8.0 * 0.625) / 3600.0).abs() < 1e-8);
+    let ours = [of_body.initial_linvel[1], of_body.initial_angvel[2]];
+    for (k, by) in [(1, 1.0 / 256.0), (2, 1.0 / 64.0)] {
+        let [slope] = slopes(by, |d| {
+            let mut values = values;
+            values[k] += d;
+            [run(values).2]
+        });
+        println!("{} against {slope}", ours[k - 1]);
+        assert!(
+            (ours[k - 1] - slope).abs() < EXACT * slope.abs() + 1e-8 / by,
+            "{k}: {} {slope}",
+            ours[k - 1]
+        );
+        assert!(4e-8 / by < FELT * slope.abs());
     }
 }
 
