@@ -22,7 +22,8 @@ use std::sync::Arc;
 /// activation, impulses, what draws cables) takes part; what moves or speeds vertices up counts as added to what was there.
 ///
 /// Steps have to be solved far: a [`tolerance`](crate::SolverSettings::tolerance) of 1e-10 or less, as that of
-/// [`Fidelity::Reference`](crate::Fidelity::Reference). Contacts are those with colliders that do not yield, and between the bodies of the tape. What has no gradient is
+/// [`Fidelity::Reference`](crate::Fidelity::Reference). Contacts are those with colliders that do not yield, with rigid bodies of the
+/// tape ([`DeformableTape::with_rigid_bodies`]), and between its deformable ones. What has no gradient is
 /// refused by [`DeformableTape::record`]; it is listed in `docs/limits.md`.
 ///
 /// How fast has a cube to be thrown so that it is at a target after half a second? Its flight is linear in that: one step of Newton's
