@@ -73,8 +73,6 @@ struct OfGeometry {
     normal: Vec3,
     place: Vec3,
     arm: Vec3,
-    /// Of slips, and of motions along the normal.
-    looks: Vec3,
 }
 
 /// What a contact says of where its body's nodes and its partner's body begin.
@@ -145,19 +143,6 @@ impl ColliderGeometry {
     ) {
         let of = OfGeometry::new(contact, (z, q), (of_force, partner_turn), self);
         out.com -= of.arm;
-        let of_weights = |nodes: &[Node]| -> Vec<f64> {
-            let of_weight = |node: &Node| {
-                let moved = node.x_end - node.x_start;
-                let [normal, ..] = &contact.frame;
-                let counts = if contact.recovers {
-                    normal.dot(&moved)
-                } else {
-                    normal.dot(&node.x_end) - node.half_thickness
-                };
-                z[node.place].dot(&contact.force) + q[0] * counts + of.looks.dot(&moved)
-            };
-            nodes.iter().map(of_weight).collect()
-        };
         if let Kind::OnSurface { point, gap, turn } = &self.kind {
             let [normal, ..] = &contact.frame;
             let along = Mat3::identity() - normal * normal.transpose();
@@ -169,7 +154,10 @@ impl ColliderGeometry {
             return;
         }
         let (nodes, carried) = self.kind.follows_from();
-        let of_weights = of_weights(nodes);
+        let of_weight = |node: &Node| {
+            contact.of_weight(&z[node.place], [&node.x_start, &node.x_end], node.half_thickness, q)
+        };
+        let of_weights: Vec<f64> = nodes.iter().map(of_weight).collect();
         out.add_by_differences(contact, nodes, &carried, &|x| {
             let Touch { normal, place, weights } = self.kind.touch(x)?;
             let of_weights = weights.iter().zip(&of_weights).map(|(weight, of)| weight * of);
@@ -235,22 +223,17 @@ impl OfGeometry {
         (of_force, partner_turn): (&Vec3, &Vec3),
         ColliderGeometry { apart, led, .. }: &ColliderGeometry,
     ) -> Self {
-        let [normal, tangents @ ..] = &contact.frame;
-        let (force, motion) = (contact.force, contact.motion);
+        let [normal, ..] = &contact.frame;
         let said = contact.relative(z) + of_force;
-        let rubbed = force - normal * normal.dot(&force);
-        let of_slips = tangents.iter().zip(&q[1..]).map(|(tangent, q)| contact.looks_along(tangent) * *q);
-        let looks = of_slips.fold(Vec3::zeros(), |sum, look| sum + look);
-        let ends = if contact.recovers { motion } else { motion + apart };
-        let of_normal = said * normal.dot(&force) - rubbed * normal.dot(&said) + ends * q[0]
-            - looks * normal.dot(&motion);
+        let ends = if contact.recovers { contact.motion } else { contact.motion + apart };
+        let of_motion = normal * q[0] + contact.looks(q);
         let arm = contact.rigid.map_or(Vec3::zeros(), |at| {
-            -force.cross(&z[at.node + 1]) - (normal * q[0] + looks).cross(partner_turn)
+            -contact.force.cross(&z[at.node + 1]) - of_motion.cross(partner_turn)
         });
         // What an overlap that is not recovered at once says of the place, its motion says already.
         let of_gap = if contact.recovers { Vec3::zeros() } else { normal * -q[0] };
-        let of_led = led.tr_mul(&(normal * q[0] + looks));
-        Self { normal: of_normal, place: of_gap + arm - of_led, arm, looks }
+        let place = of_gap + arm - led.tr_mul(&of_motion);
+        Self { normal: contact.of_normal(&said, &ends, q), place, arm }
     }
 }
 

@@ -167,6 +167,31 @@ impl ContactRecord {
         }
     }
 
+    /// What its slips say by q: along the surface.
+    pub fn looks(&self, q: &[f64]) -> Vec3 {
+        let [_, tangents @ ..] = &self.frame;
+        let of_slips = tangents.iter().zip(&q[1..]).map(|(tangent, q)| (tangent, *q));
+        of_slips.fold(Vec3::zeros(), |sum, (tangent, q)| sum + self.looks_along(tangent) * q)
+    }
+
+    /// Derivative of the Lagrangian with respect to its normal, the tangents turning with it: what z and the loss of its force say at its
+    /// points, and how far apart these end, or have moved if the overlap is not recovered altogether.
+    pub fn of_normal(&self, said: &Vec3, apart: &Vec3, q: &[f64]) -> Vec3 {
+        let [normal, ..] = &self.frame;
+        let (force, motion) = (self.force, self.motion);
+        let rubbed = force - normal * normal.dot(&force);
+        said * normal.dot(&force) - rubbed * normal.dot(said) + apart * q[0]
+            - self.looks(q) * normal.dot(&motion)
+    }
+
+    /// The same with respect to the weight of a node that goes from one place to another, with z there and its part of the thickness.
+    pub fn of_weight(&self, z: &Vec3, [x_start, x_end]: [&Vec3; 2], half_thickness: f64, q: &[f64]) -> f64 {
+        let [normal, ..] = &self.frame;
+        let moved = x_end - x_start;
+        let counts = if self.recovers { normal.dot(&moved) } else { normal.dot(x_end) - half_thickness };
+        z.dot(&self.force) + q[0] * counts + self.looks(q).dot(&moved)
+    }
+
     /// A vector on its nodes, by their weights, and against it on the rigid body.
     pub fn laid(&self, vector: Vec3) -> NodeVectors {
         let soft = self.nodes.iter().map(|(node, weight)| (*node, vector * *weight));

@@ -204,3 +204,24 @@ fn solve_dense(matrix: DMatrix<f64>, rhs: &DVector<f64>) -> Option<DVector<f64>>
         (left(&q) <= LEFT * rhs.amax()).then_some(q)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows that repeat others but for 1e-8, and right-hand sides that do but for 1e-10: elimination has forces of 1e4 and more that cancel.
+    #[test]
+    fn contacts_that_say_the_same_have_no_large_forces() {
+        let weight = |k: usize| ((k * 7919 + 13) % 101) as f64 / 50.0 - 1.0;
+        let whole = DMatrix::from_fn(6, 6, |i, j| if i == j { 1.0 } else { 0.1 * weight(6 * i + j) });
+        let apart = |i: usize, j: usize| if i < 6 { 0.0 } else { 1e-8 * weight(i + 7 * j) };
+        let rows = DMatrix::from_fn(12, 6, |i, j| whole[(i % 6, j)] + apart(i, j));
+        let rhs =
+            &rows * DVector::from_fn(6, |k, _| weight(k)) + DVector::from_fn(12, |k, _| 1e-10 * weight(k));
+        let matrix = &rows * rows.transpose();
+        let eliminated = matrix.clone().lu().solve(&rhs).unwrap();
+        assert!(eliminated.amax() > 1e4, "{:e}", eliminated.amax());
+        let found = solve_dense(matrix, &rhs).unwrap();
+        assert!(found.amax() < 1e2, "{:e}", found.amax());
+    }
+}

@@ -204,24 +204,16 @@ impl PairGeometry {
     }
 
     fn of_geometry(&self, contact: &ContactRecord, (z, q): (&[Vec3], &[f64]), of_force: &Vec3) -> OfGeometry {
-        let [normal, tangents @ ..] = &contact.frame;
-        let (force, motion) = (contact.force, contact.motion);
-        let said = contact.nodes.iter().fold(*of_force, |sum, (node, weight)| sum + z[*node] * *weight);
-        let rubbed = force - normal * normal.dot(&force);
-        let of_slips = tangents.iter().zip(&q[1..]).map(|(tangent, q)| (tangent, *q));
-        let looks = of_slips.fold(Vec3::zeros(), |sum, (tangent, q)| sum + contact.looks_along(tangent) * q);
+        let said = contact.relative(z) + of_force;
         // Positions where the step ends if it is to end at no gap, otherwise motions.
         let counts =
             |k: usize| self.x_end[k] - if contact.recovers { self.x_start[k] } else { Vec3::zeros() };
         let apart = (0..4).map(|k| counts(k) * self.weight(contact, k)).sum::<Vec3>();
-        let of_normal = said * normal.dot(&force) - rubbed * normal.dot(&said) + apart * q[0]
-            - looks * normal.dot(&motion);
         let weights = std::array::from_fn(|k| {
-            let skin = if contact.recovers { 0.0 } else { self.half_thickness[k] * self.side(k) };
-            let moved = self.x_end[k] - self.x_start[k];
-            z[self.nodes[k]].dot(&force) + q[0] * (normal.dot(&counts(k)) - skin) + looks.dot(&moved)
+            let (way, skin) = ([&self.x_start[k], &self.x_end[k]], self.half_thickness[k] * self.side(k));
+            contact.of_weight(&z[self.nodes[k]], way, skin, q)
         });
-        OfGeometry { normal: of_normal, weights }
+        OfGeometry { normal: contact.of_normal(&said, &apart, q), weights }
     }
 
     /// The weight of one of the nodes.

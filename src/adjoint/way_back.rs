@@ -129,9 +129,9 @@ impl DeformableTape {
             return Err(BodyError::NoGradient { step, what });
         }
         let is_ours = |(place, loss): (usize, &DeformableLoss)| {
-            let is_like = loss.model.rest.len() == self.models[place].rest.len();
-            let is_like = is_like && loss.rigid_bodies == self.rigid_bodies;
-            loss.bodies == self.bodies && is_like && loss.place == place && loss.seeds.len() == step
+            let is_like = loss.model.rest.len() == self.models[place].rest.len() && loss.seeds.len() == step;
+            let has_bodies = loss.bodies == self.bodies && loss.rigid_bodies == self.rigid_bodies;
+            is_like && has_bodies && loss.place == place
         };
         if !losses.iter().enumerate().all(is_ours) {
             let what = "the loss is of another tape, another number of steps, or another body";

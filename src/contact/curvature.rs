@@ -16,12 +16,13 @@ pub(crate) fn curvature(obstacle: &Obstacle, point: &Vec3, normal: &Vec3) -> Mat
         let along = Mat3::identity() - normal * normal.transpose();
         if distance > 0.0 { along / distance } else { Mat3::zeros() }
     };
-    let around_y = || {
-        // The normal leans by the same angle all around.
-        let (out, across) = (normal.x.hypot(normal.z), Vec3::y().cross(normal));
-        let distance = point.x.hypot(point.z);
+    // From which the normal leans by the same angle all around.
+    let around = |axis: &Vec3, from: &Vec3| {
+        let (across, distance) = (axis.cross(normal), axis.cross(&(point - from)).norm());
         match across.try_normalize(0.0) {
-            Some(across) if distance > 0.0 => across * across.transpose() * (out / distance),
+            Some(direction) if distance > 0.0 => {
+                direction * direction.transpose() * (across.norm() / distance)
+            }
             _ => Mat3::zeros(),
         }
     };
@@ -34,11 +35,9 @@ pub(crate) fn curvature(obstacle: &Obstacle, point: &Vec3, normal: &Vec3) -> Mat
             if !(0.0..=1.0).contains(&place) {
                 return about(if place > 1.0 { b } else { a });
             }
-            let distance = (point - a - axis * place).norm();
-            let across = axis.cross(normal).normalize();
-            if distance > 0.0 { across * across.transpose() / distance } else { Mat3::zeros() }
+            around(&axis.normalize(), &a)
         }
-        TypedShape::Cylinder(_) | TypedShape::Cone(_) => around_y(),
+        TypedShape::Cylinder(_) | TypedShape::Cone(_) => around(&Vec3::y(), &Vec3::zeros()),
         TypedShape::Cuboid(cuboid) => {
             let half = from_real(cuboid.half_extents);
             let beyond = point.abs() - half;
@@ -59,16 +58,19 @@ pub(crate) fn curvature(obstacle: &Obstacle, point: &Vec3, normal: &Vec3) -> Mat
 
 /// Whether a point, in the obstacle's frame, is a corner of a box.
 pub(crate) fn is_box_corner(obstacle: &Obstacle, point: &Vec3) -> bool {
-    let Some(cuboid) = obstacle.shape.as_cuboid() else { return false };
-    let half = from_real(cuboid.half_extents);
-    (0..3).all(|k| (point[k].abs() - half[k]).abs() <= ON_EDGE * half[k])
+    let half = obstacle.shape.as_cuboid().map(|cuboid| from_real(cuboid.half_extents));
+    half.is_some_and(|half| on_faces(&half, point) == [true; 3])
+}
+
+/// By axes, whether a point is on a face of a box that is across them.
+fn on_faces(half: &Vec3, point: &Vec3) -> [bool; 3] {
+    [0, 1, 2].map(|k| (point[k].abs() - half[k]).abs() <= ON_EDGE * half[k])
 }
 
 /// Two points of the edge of a box that a point is on, away from its corners, in the obstacle's frame.
 pub(crate) fn box_edge_at(obstacle: &Obstacle, point: &Vec3) -> Option<[Vec3; 2]> {
     let half = from_real(obstacle.shape.as_cuboid()?.half_extents);
-    let is_beside = |k: usize| (point[k].abs() - half[k]).abs() <= ON_EDGE * half[k];
-    let beside = [0, 1, 2].map(is_beside);
+    let beside = on_faces(&half, point);
     let along = (0..3).find(|&k| !beside[k] && beside[(k + 1) % 3] && beside[(k + 2) % 3])?;
     let end = |sign: f64| {
         Vec3::from_fn(|k, _| if k == along { sign * half[k] } else { point[k].signum() * half[k] })
@@ -110,9 +112,9 @@ mod tests {
             // Sharp edges are not told of, nor the borders between what is round and what is plane.
             let [ahead, behind] = [by, -by].map(|by| curvature(&obstacle, &(p + by), &at(&(p + by)).unwrap().normal));
             let on_edge = |n: &Vec3| match which {
-                2 => n.y.abs() > 1e-3 && n.y.abs() < 0.999,
+                2 => n.y.abs() > 1e-3 && n.y.abs() < 0.999_999,
                 // Its flank leans by atan(0.4).
-                3 => (n.y - 0.3714).abs() > 1e-3 && n.y > -0.999,
+                3 => (n.y - 0.3714).abs() > 1e-3 && n.y > -0.999_999,
                 _ => false,
             };
             prop_assume!(![more, less, foot.normal].iter().any(on_edge));

@@ -28,13 +28,7 @@ pub(super) fn proxy_of(context: &StepContext<'_>, handle: RigidBodyHandle, body:
 
 fn dynamic_proxy(context: &StepContext<'_>, body: &RigidBody, start: &Pose64) -> RigidProxy {
     let masses = current_mass_properties(context.sets.colliders, body);
-    let inertia = masses.effective_world_inv_inertia;
-    let rows = [
-        [inertia.m11, inertia.m12, inertia.m13],
-        [inertia.m12, inertia.m22, inertia.m23],
-        [inertia.m13, inertia.m23, inertia.m33],
-    ];
-    let inv_inertia = Mat3::from_fn(|r, c| rows[r][c].into());
+    let inv_inertia = effective_inv_inertia(&masses);
     let inv_mass = from_real(masses.effective_inv_mass);
     let force = from_real(external_force(body, &masses, context.gravity_f32()));
     let torque = from_real(body.user_torque());
@@ -50,6 +44,17 @@ fn dynamic_proxy(context: &StepContext<'_>, body: &RigidBody, start: &Pose64) ->
             angular: angvel + inv_inertia * torque * context.h,
         },
     }
+}
+
+/// In the world, without the axes that are locked [1/(kg m²)].
+pub(super) fn effective_inv_inertia(masses: &RigidBodyMassProps) -> Mat3 {
+    let inertia = masses.effective_world_inv_inertia;
+    let rows = [
+        [inertia.m11, inertia.m12, inertia.m13],
+        [inertia.m12, inertia.m22, inertia.m23],
+        [inertia.m13, inertia.m23, inertia.m33],
+    ];
+    Mat3::from_fn(|r, c| rows[r][c].into())
 }
 
 /// The inverse inertia at a rounded rotation; as it is where rotations are locked.

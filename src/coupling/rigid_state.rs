@@ -1,6 +1,6 @@
 //! A rigid body as rapier keeps it between steps, and what moves it in the next one, in double precision.
 
-use super::mass_properties::current_mass_properties;
+use super::mass_properties::{current_mass_properties, effective_inv_inertia};
 use crate::math::{Mat3, Pose64, Vec3, from_real};
 use rapier3d::dynamics::{RigidBody, RigidBodyHandle};
 use rapier3d::pipeline::PhysicsWorld;
@@ -57,12 +57,6 @@ impl RigidLoad {
     pub fn of(physics: &PhysicsWorld, body: &RigidBody) -> Self {
         let masses = current_mass_properties(&physics.colliders, body);
         let local = &masses.local_mprops;
-        let inertia = masses.effective_world_inv_inertia;
-        let rows = [
-            [inertia.m11, inertia.m12, inertia.m13],
-            [inertia.m12, inertia.m22, inertia.m23],
-            [inertia.m13, inertia.m23, inertia.m33],
-        ];
         let axes = rapier3d::math::Pose::from_rotation(local.principal_inertia_local_frame);
         let principal = (Pose64::from_real(&axes).rotation, from_real(local.principal_inertia()));
         let gravity_scale = f64::from(body.gravity_scale());
@@ -72,7 +66,7 @@ impl RigidLoad {
         Self {
             mass: f64::from(local.mass()),
             inv_mass: from_real(masses.effective_inv_mass),
-            inv_inertia: Mat3::from_fn(|r, c| rows[r][c].into()),
+            inv_inertia: effective_inv_inertia(&masses),
             whole_inv_inertia: axes * inverse * axes.transpose(),
             turns: Vec3::from_fn(|k, _| if locked[k] { 0.0 } else { 1.0 }),
             principal: body.gyroscopic_forces_enabled().then_some(principal),
@@ -83,9 +77,7 @@ impl RigidLoad {
             damping: [body.linear_damping(), body.angular_damping()].map(f64::from),
         }
     }
-}
 
-impl RigidLoad {
     /// Gravity along the axes that are not locked [m/s²].
     pub fn falls(&self) -> Vec3 {
         self.gravity.zip_map(&self.inv_mass, |g, inv_mass| if inv_mass > 0.0 { g } else { 0.0 })

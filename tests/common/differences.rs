@@ -250,6 +250,21 @@ pub fn slopes<const N: usize>(by: f64, mut at: impl FnMut(f64) -> [f64; N]) -> [
     std::array::from_fn(|k| (8.0 * (near[k] - less[k]) - (far[k] - farther_less[k])) / (12.0 * by))
 }
 
+/// Settings of the states that are differentiated: solved to rounding.
+pub fn strict() -> SolverSettings {
+    let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
+    settings.contact_tolerance(1e-12).keeps_spin(false)
+}
+
+/// The vertex nearest to a place.
+pub fn nearest(body: &DeformableBody, place: [f64; 3]) -> usize {
+    let far = |v: &usize| {
+        let x = body.position(*v).unwrap();
+        (0..3).map(|k| (x[k] - place[k]).powi(2)).sum::<f64>()
+    };
+    (0..body.vertex_count()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap()
+}
+
 /// A loss of what came of a run, its derivatives, and which parameters it feels enough to tell.
 pub struct Sought<'a> {
     pub loss: &'a dyn Fn(&Outcome) -> f64,

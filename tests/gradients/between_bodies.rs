@@ -1,6 +1,6 @@
 //! Gradients over steps of several deformable bodies that touch one another, against central differences between whole runs.
 
-use crate::differences::{slopes, weight};
+use crate::differences::{nearest, slopes, strict, weight};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
 
@@ -47,15 +47,6 @@ struct Outcome {
     h: f64,
 }
 
-/// The vertex nearest to a place.
-fn nearest(body: &DeformableBody, place: [f64; 3]) -> usize {
-    let far = |v: &usize| {
-        let x = body.position(*v).unwrap();
-        (0..3).map(|k| (x[k] - place[k]).powi(2)).sum::<f64>()
-    };
-    (0..body.vertex_count()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap()
-}
-
 impl Scene {
     fn new(lower: DeformableBodyBuilder, upper: DeformableBodyBuilder) -> Self {
         Self { lower, upper, pins: |x| x.y < -0.249, steps: 12, look: 7, stride: 1.0 / 32.0 }
@@ -67,8 +58,7 @@ impl Scene {
         let mut physics = PhysicsWorld::new();
         physics.gravity = Vector::Y * gravity as f32;
         let mut world = DeformableWorld::new();
-        let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
-        let settings = settings.contact_tolerance(1e-12).keeps_spin(false);
+        let settings = strict();
         let material = |modulus: f64, density: f64| {
             DeformableMaterial::new(modulus, 0.3).density(density).mass_damping(1.0).friction(friction)
         };

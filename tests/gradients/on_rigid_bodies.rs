@@ -1,7 +1,7 @@
 //! Gradients over steps of deformable bodies that touch rigid ones that yield, against central differences between whole runs. Rapier is in
 //! `f32`: what is changed is changed by powers of two, by so much that its last places do not count.
 
-use crate::differences::{slopes, weight};
+use crate::differences::{nearest, slopes, strict, weight};
 use foible3d::prelude::*;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rapier3d::prelude::*;
@@ -105,8 +105,7 @@ impl Scene {
         let mut physics = PhysicsWorld::new();
         physics.gravity = Vector::Y * gravity as f32;
         let mut world = DeformableWorld::new();
-        let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
-        let settings = settings.contact_tolerance(1e-12).keeps_spin(false);
+        let settings = strict();
         let material =
             DeformableMaterial::new(modulus, 0.3).density(density).mass_damping(1.0).friction(friction);
         let soft = self.soft.clone().pinned(self.pins).material(material).can_sleep(false).settings(settings);
@@ -124,11 +123,7 @@ impl Scene {
             .friction(friction as f32);
         let (rigid, collider) = physics.insert(rigid, collider);
         let body = &mut world.bodies[soft];
-        let far = |v: &usize| {
-            let x = body.position(*v).unwrap();
-            (x[0] - 0.12).powi(2) + (x[1] + 0.125).powi(2) + (x[2] - 0.01).powi(2)
-        };
-        let shifted = (0..body.vertex_count()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
+        let shifted = nearest(body, [0.12, -0.125, 0.01]);
         let at = body.position(shifted).unwrap();
         body.set_position(shifted, [at[0] + low, at[1] - 0.5 * low, at[2] - low]).unwrap();
         for vertex in body.pinned().collect::<Vec<_>>() {

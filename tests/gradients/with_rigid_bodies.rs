@@ -1,7 +1,7 @@
 //! Gradients with rigid bodies, beside `on_rigid_bodies.rs`: of what touches those that do not yield, what pads lift, which steps are refused, and what
 //! is done to rigid bodies between steps.
 
-use crate::differences::slopes;
+use crate::differences::{slopes, strict};
 use crate::on_rigid_bodies::{EXACT, FELT, block, tips};
 use foible3d::prelude::*;
 use rapier3d::prelude::*;
@@ -16,8 +16,7 @@ fn drag([modulus, friction, lead, shift]: [f64; 4]) -> (DeformableTape, Collider
     let vertices = vec![[0.08, 0.25, 0.0], [-0.04, 0.25, -0.08], [-0.05, 0.25, 0.07], [-0.08, 0.0, 0.0]];
     let mesh = TetMesh::new(vertices, vec![[0, 2, 1, 3]]).unwrap();
     let material = DeformableMaterial::new(modulus, 0.3).mass_damping(1.0).friction(friction);
-    let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
-    let settings = settings.contact_tolerance(1e-12).keeps_spin(false);
+    let settings = strict();
     let body = DeformableBodyBuilder::mesh(&mesh).pinned(|x| x.y > 0.2).material(material);
     let body = world.insert(body.settings(settings).can_sleep(false)).unwrap();
     let ball =
@@ -78,8 +77,7 @@ fn what_sticks_to_what_turns_or_is_round_has_gradients() {
         let vertices = vec![[0.08, 0.2, 0.0], [-0.04, 0.2, -0.08], [-0.05, 0.2, 0.07], [0.01, 0.0, 0.02]];
         let mesh = TetMesh::new(vertices, vec![[0, 2, 1, 3]]).unwrap();
         let material = DeformableMaterial::new(5.0e4, 0.3).mass_damping(1.0).friction(2.0);
-        let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
-        let settings = settings.contact_tolerance(1e-12).keeps_spin(false);
+        let settings = strict();
         let body = DeformableBodyBuilder::mesh(&mesh).material(material).settings(settings).can_sleep(false);
         let body = world.insert(body.pinned(move |x| x.y > 0.1 && on_ball)).unwrap();
         let (rigid, collider) = match on_ball {
@@ -123,8 +121,7 @@ fn lift([modulus, heaviness, gravity, rise]: [f64; 4]) -> (DeformableTape, Rigid
     let mut physics = PhysicsWorld::new();
     physics.gravity = Vector::Y * gravity as f32;
     let mut world = DeformableWorld::new();
-    let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
-    let settings = settings.contact_tolerance(1e-12).keeps_spin(false);
+    let settings = strict();
     let material = DeformableMaterial::new(modulus, 0.3).mass_damping(1.0).friction(1.0);
     let pads = [-1.0f32, 1.0].map(|side| {
         let pad = DeformableBodyBuilder::cuboid(Vector::new(0.04, 0.05, 0.06), [2, 2, 2]);
@@ -191,8 +188,7 @@ fn a_body_of_two_colliders_far_from_the_origin_has_gradients() {
     let run = |[heaviness, down, spin]: [f64; 3]| {
         let (mut physics, mut world) = (PhysicsWorld::new(), DeformableWorld::new());
         physics.gravity = Vector::Y * -9.75;
-        let settings = SolverSettings::default().solver(Solver::Newton).tolerance(1e-12).max_iterations(400);
-        let settings = settings.contact_tolerance(1e-12).keeps_spin(false);
+        let settings = strict();
         let material = DeformableMaterial::new(5.0e4, 0.3).mass_damping(1.0).friction(1.0);
         let soft = tips().translation(Vector::X * 4.0).pinned(|x| x.y < -0.249).material(material);
         let soft = world.insert(soft.settings(settings).can_sleep(false)).unwrap();
