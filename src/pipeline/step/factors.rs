@@ -41,7 +41,7 @@ impl StepScratch {
                 return false;
             };
             counters.factorizations += done.factorizations;
-            counters.columns += done.columns + factors.prepare_ahead(done.id, &work.ahead);
+            counters.columns += done.columns + factors.prepare_ahead(done.id, body, &work.ahead);
             work.set_factor(done.id, done.has_columns);
             true
         });

@@ -66,7 +66,7 @@ fn empty_factor(symbolic: &Arc<Symbolic>, surface: &Surface) -> SystemFactor {
         system: SystemMatrix::RestStiffness,
         columns: ComplianceColumns::new(surface, SystemMatrix::RestStiffness),
         clusters: None,
-        coarse: CoarseInverse { local: Vec::new(), modes: None },
+        coarse: CoarseInverse::without_modes(Vec::new()),
         serial: u64::MAX,
     }
 }

@@ -3,6 +3,7 @@
 //!
 //! Its contact problem has as many unknowns as the bodies have modes, however many contacts there are.
 
+use super::lattice_metric::LatticeMetric;
 use super::problem::{ConeTolerance, spatial};
 use super::projection;
 use crate::contact::Law;
@@ -39,10 +40,14 @@ pub(crate) struct ConeMetric {
     pub contacts: Vec<MetricContact>,
     /// Bodies and proxies with modes.
     pub bodies: usize,
+    /// Their first rows in the coarse matrix, and their number.
+    pub rows: Vec<usize>,
     /// Blocks of the lower triangle of the coarse matrix and of its factor, column by column.
     pub filled: Vec<(usize, usize)>,
     /// First of each column.
     columns: Vec<usize>,
+    /// In place of all these where there are large bodies.
+    pub lattice: LatticeMetric,
 }
 
 /// No mode.
@@ -85,6 +90,8 @@ impl MetricContact {
 impl ConeMetric {
     /// Takes the pattern of [`ConeMetric::filled`] in.
     pub fn index_columns(&mut self) {
+        self.rows.clear();
+        self.rows.extend((0..=self.bodies).map(|b| MODES * b));
         self.columns.clear();
         self.columns.extend((0..self.filled.len()).filter(|&k| self.filled[k].0 == self.filled[k].1));
         self.columns.push(self.filled.len());
@@ -100,6 +107,12 @@ impl ConeMetric {
 
     /// `out = V Vᵀ v`; `p` is memory.
     pub fn multiply_modes(&self, v: &[f64], p: &mut Vec<Modes>, out: &mut Vec<f64>) {
+        if self.lattice.points > 0 {
+            out.clear();
+            let into =
+                |k: usize, moved: [f64; 3]| out.extend_from_slice(&moved[..self.contacts[k].dimension]);
+            return self.lattice.multiply(|k| self.contacts[k].of(v), into);
+        }
         p.clear();
         p.resize(self.bodies, STILL);
         self.contacts.iter().for_each(|contact| contact.add_modes(contact.of(v), p));
@@ -125,14 +138,4 @@ impl ConeMetric {
         }
         worst / largest
     }
-}
-
-#[inline(always)]
-pub(crate) fn norm_squared(modes: &Modes) -> f64 {
-    modes.iter().map(|lane| (*lane * *lane).sum()).sum()
-}
-
-#[inline(always)]
-pub(crate) fn dot_modes(a: &Modes, b: &Modes) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (*a * *b).sum()).sum()
 }

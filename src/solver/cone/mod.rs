@@ -12,6 +12,9 @@ mod metric;
 
 mod coarse_newton;
 
+mod body_modes;
+mod lattice_metric;
+
 mod projected_gradient;
 
 mod sweeps;
@@ -21,6 +24,7 @@ mod condensation;
 mod secant;
 
 pub(crate) use condensation::{Condensation, Condensed};
+pub(crate) use lattice_metric::Support;
 pub(crate) use metric::{ConeMetric, MetricContact, MetricSide, Modes, STILL};
 pub(crate) use projected_gradient::{ConeOperator, GradientBudget, ProjectedGradient};
 

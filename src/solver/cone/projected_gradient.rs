@@ -12,7 +12,8 @@ use crate::contact::Law;
 /// Memory for solves.
 #[derive(Default)]
 pub(crate) struct ProjectedGradient {
-    coarse: CoarseNewton,
+    coarse: CoarseNewton<Modes>,
+    lattice: CoarseNewton<[f64; 3]>,
     d: Vec<f64>,
     Wd: Vec<f64>,
     VVd: Vec<f64>,
@@ -82,8 +83,7 @@ impl ProjectedGradient {
         let mut work = GradientWork { products: 0, error: metric.error(z, r, tolerance) };
         let mut brings_back = true;
         while work.error > tolerance.relative && work.products < products {
-            let problem = CoarseProblem { metric, z, r, alpha: self.alpha, goes_on };
-            self.coarse.solve(&problem, [&mut self.d, &mut self.VVd]);
+            self.choose_direction(metric, [z, r], goes_on);
             let (leads, slope) = self.complete_direction(metric, r, operator, brings_back);
             brings_back &= leads != Leads::HeldAlone;
             if !(slope < 0.0) {
@@ -104,6 +104,19 @@ impl ProjectedGradient {
             work.error = metric.error(z, r, tolerance);
         }
         work
+    }
+
+    /// The best change of the forces in the metric, by its modes.
+    fn choose_direction(&mut self, metric: &ConeMetric, [z, r]: [&[f64]; 2], goes_on: bool) {
+        let Self { d, VVd, alpha, .. } = self;
+        let (contacts, alpha, out) = (&metric.contacts[..], *alpha, [d, VVd]);
+        if metric.lattice.points > 0 {
+            let problem = CoarseProblem { modes: &metric.lattice, contacts, z, r, alpha, goes_on: true };
+            self.lattice.solve(&problem, out);
+        } else {
+            let problem = CoarseProblem { modes: metric, contacts, z, r, alpha, goes_on };
+            self.coarse.solve(&problem, out);
+        }
     }
 
     /// Lets what is solved for beside the method follow the direction; what leads along it then, and its slope. What holds may come alone, where

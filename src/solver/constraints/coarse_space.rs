@@ -1,6 +1,7 @@
 //! The metric of the first-order contact solve for an island: modes of its bodies and proxies at their contacts.
 
 use super::elimination::Elimination;
+use super::lattice_space::LatticeSpace;
 use super::lists::ActiveContact;
 use super::rigid_proxy::{RigidProxies, RigidProxy};
 use crate::contact::{Constraint, Endpoint, ProxyId};
@@ -19,6 +20,7 @@ pub(super) struct CoarseSpace {
     of_proxy: Vec<(ProxyId, usize)>,
     elimination: Elimination,
     sizes: Vec<usize>,
+    lattices: LatticeSpace,
 }
 
 /// Motions of a rigid shape, scaled like the modes of an elastic one.
@@ -59,7 +61,9 @@ impl CoarseSpace {
             metric.contacts.push(contact);
         }
         metric.bodies = self.rigid.len();
-        self.arrange(metric);
+        if !self.lattices.update(metric, contacts, &self.of_body, parts) {
+            self.arrange(metric);
+        }
     }
 
     fn contact(&mut self, constraint: &Constraint, first: usize, parts: CoarseParts<'_>) -> MetricContact {
@@ -143,7 +147,7 @@ impl RigidModes {
     }
 }
 
-fn has_affine_modes(parts: CoarseParts<'_>, index: usize) -> bool {
+pub(super) fn has_affine_modes(parts: CoarseParts<'_>, index: usize) -> bool {
     let body = &parts.bodies[index];
     body.preconditioner.is_framed() && parts.factors.of(index, body).coarse.modes.is_some()
 }

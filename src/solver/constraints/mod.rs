@@ -16,6 +16,7 @@ mod delassus;
 mod matrix_free;
 
 mod coarse_space;
+mod lattice_space;
 
 mod arms;
 mod gaps;

@@ -4,10 +4,12 @@
 //! affine motions account for of `A⁻¹`; what is left is positive semidefinite (Galerkin's projection).
 
 use super::factor::Symbolic;
+use super::lattice_modes::LatticeModes;
 use crate::fem::DeformableModel;
 use crate::math::Vec3;
 use crate::math::lanes::Lane;
 use nalgebra::{DMatrix, SMatrix};
+use std::sync::OnceLock;
 
 /// Four functions in three directions.
 pub(crate) const MODES: usize = 12;
@@ -29,6 +31,8 @@ pub(crate) struct CoarseInverse {
     /// Per node: as [`UpperTriangle::local_compliance`](super::gauss_seidel::UpperTriangle::local_compliance).
     pub local: Vec<f64>,
     pub modes: Option<AffineModes>,
+    /// Of large bodies, once something touches them.
+    lattice: OnceLock<Option<LatticeModes>>,
 }
 
 impl CoarseInverse {
@@ -36,12 +40,31 @@ impl CoarseInverse {
         Self {
             local: symbolic.upper(values).local_compliance(symbolic.d, pins),
             modes: Some(AffineModes::new(model, pins, symbolic, values)),
+            lattice: OnceLock::new(),
         }
+    }
+
+    /// Of what is no matrix.
+    pub fn without_modes(local: Vec<f64>) -> Self {
+        Self { local, modes: None, lattice: OnceLock::new() }
+    }
+
+    pub fn lattice(&self) -> Option<&LatticeModes> {
+        self.lattice.get()?.as_ref()
+    }
+
+    pub fn lattice_bytes(&self) -> usize {
+        self.lattice().map_or(0, LatticeModes::bytes)
+    }
+
+    /// Makes it, if it has not been tried yet.
+    pub fn make_lattice(&self, make: impl FnOnce() -> Option<LatticeModes>) {
+        self.lattice.get_or_init(make);
     }
 
     /// Without modes: of what falls short of the inverse, of its affine part most of all, or seldom goes without columns.
     pub fn local(pins: &[u32], symbolic: &Symbolic, values: &[f64]) -> Self {
-        Self { local: symbolic.upper(values).local_compliance(symbolic.d, pins), modes: None }
+        Self::without_modes(symbolic.upper(values).local_compliance(symbolic.d, pins))
     }
 
     /// As [`Self::local`], in the memory of another.

@@ -368,6 +368,29 @@ pub(crate) fn cholesky(
     .map_err(|_| NotPositiveDefinite)
 }
 
+/// Inverts a dense symmetric matrix of order n, of which only the lower triangle is read, in its place: all of it, and symmetric to the bit.
+pub(crate) fn invert(
+    values: &mut [f64],
+    n: usize,
+    scratch: &mut DenseScratch,
+) -> Result<(), NotPositiveDefinite> {
+    cholesky(values, n, scratch)?;
+    let L = std::mem::take(&mut scratch.0.panel);
+    let (mut L, stack) =
+        (L, scratch.0.stack(llt::inverse::inverse_scratch::<f64>(n, Par::Seq).unaligned_bytes_required()));
+    L.clear();
+    L.extend_from_slice(values);
+    let inverse = MatMut::from_column_major_slice_mut(values, n, n);
+    llt::inverse::inverse(inverse, MatRef::from_column_major_slice(&L, n, n), Par::Seq, stack);
+    scratch.0.panel = L;
+    for j in 0..n {
+        for i in j + 1..n {
+            values[n * i + j] = values[n * j + i];
+        }
+    }
+    Ok(())
+}
+
 /// `B ← B L⁻ᵀ` for `rows` rows of B, L of order n.
 pub(crate) fn solve_from_right(L: &[f64], n: usize, B: &mut [f64], rows: usize) {
     let L = MatRef::from_column_major_slice(L, n, n);

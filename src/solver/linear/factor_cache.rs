@@ -10,6 +10,7 @@ use super::coefficients::{dimension, node_inertia};
 use super::compliance_columns::ComplianceColumns;
 use super::factor::{BATCH, FactorScratch, Symbolic};
 use super::factor_values::Factor;
+use super::lattice_modes::LatticeModes;
 use super::operator::StiffnessOperator;
 use super::system;
 use super::system::FactorKey;
@@ -151,8 +152,23 @@ impl FactorCache {
             columns_pay(symbolic, factor, model, touched) && self.columns_wanted <= self.column_budget;
         if work.has_columns {
             work.columns = self.make_columns(work.id);
+        } else if !self.nodes.is_empty() {
+            self.make_lattice(work.id, body);
         }
         Some(work)
+    }
+
+    /// What products of a large body's contacts are led by, where it has no columns; of one whose pins have changed only affine modes.
+    fn make_lattice(&mut self, id: FactorId, body: &DeformableBody) {
+        let Entry { made: SystemFactor { symbolic, factor, coarse, .. }, key, .. } = &self.factors[id.0];
+        if coarse.modes.is_none() || !matches!(**factor, Factor::Double(_) | Factor::Single(_)) {
+            return;
+        }
+        coarse.make_lattice(|| {
+            LatticeModes::new(&body.model, &key.pins, symbolic, || {
+                system::assemble(&body.model, &body.materials, &key.pins, key.system, key.h(), symbolic)
+            })
+        });
     }
 
     /// Makes a body's factor, and the columns of all of its surface if few contacts pay for theirs; as [`Self::prepare`].
@@ -164,6 +180,8 @@ impl FactorCache {
             self.nodes.clear();
             self.nodes.extend(all);
             work.columns = self.make_columns(work.id);
+        } else {
+            self.make_lattice(work.id, body);
         }
         Some(work)
     }
@@ -320,7 +338,7 @@ impl FactorCache {
         let h = key.h();
         if key.solver == Solver::ConjugateGradients {
             let operator = StiffnessOperator::new(&body.model, &body.materials, &key.pins, key.system, h);
-            let coarse = CoarseInverse { local: operator.local_compliance(), modes: None };
+            let coarse = CoarseInverse::without_modes(operator.local_compliance());
             return Some((Factor::Iterative(Box::new(operator)), coarse));
         }
         if key.solver == Solver::Xpbd {
@@ -328,7 +346,7 @@ impl FactorCache {
             let mut mobility: Vec<f64> = inertia.into_iter().map(|m| 1.0 / m).collect();
             let factor = Factor::Jacobi(mobility.clone());
             key.pins.iter().for_each(|&p| mobility[p as usize] = 0.0);
-            return Some((factor, CoarseInverse { local: mobility, modes: None }));
+            return Some((factor, CoarseInverse::without_modes(mobility)));
         }
         let values = system::assemble(&body.model, &body.materials, &key.pins, key.system, h, symbolic);
         let coarse = match key.solver {
@@ -354,11 +372,15 @@ impl FactorCache {
     }
 
     /// Makes the columns of the first of these surface nodes that have none: one batch of them, so that
-    /// a coming touch finds them there. Returns how many.
-    pub fn prepare_ahead(&mut self, id: FactorId, surface_nodes: &[u32]) -> usize {
+    /// a coming touch finds them there, or the lattice. Returns how many.
+    pub fn prepare_ahead(&mut self, id: FactorId, body: &DeformableBody, surface_nodes: &[u32]) -> usize {
+        if surface_nodes.is_empty() {
+            return 0;
+        }
         let Entry { made: SystemFactor { symbolic, factor, columns, system, .. }, model, .. } =
             &self.factors[id.0];
         if !columns_pay(symbolic, factor, model, FEW_NODES) {
+            self.make_lattice(id, body);
             return 0;
         }
         let missing = surface_nodes.iter().copied().filter(|s| !columns.has(*s));
@@ -374,8 +396,9 @@ impl FactorCache {
 
     /// Bytes of all numeric factors.
     pub fn factor_bytes(&self) -> usize {
-        let bytes = |f: &Entry| f.made.factor.bytes() + f.made.clusters.as_ref().map_or(0, Clusters::bytes);
-        self.factors.iter().map(bytes).sum()
+        let beside =
+            |f: &SystemFactor| f.clusters.as_ref().map_or(0, Clusters::bytes) + f.coarse.lattice_bytes();
+        self.factors.iter().map(|f| f.made.factor.bytes() + beside(&f.made)).sum()
     }
 
     /// Bytes of all columns.

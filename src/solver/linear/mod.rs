@@ -20,6 +20,7 @@ mod block_matrix;
 mod system;
 
 mod affine_modes;
+mod lattice_modes;
 
 mod clusters;
 mod compliance_columns;
@@ -38,8 +39,9 @@ mod modes;
 pub(crate) use affine_modes::{CoarseInverse, MODES};
 pub(crate) use block_matrix::{BlockFactor, BlockMatrix};
 pub(crate) use compliance_columns::ComplianceColumns;
-pub(crate) use factor::{FactorScratch, Symbolic};
+pub(crate) use factor::{DenseScratch, FactorScratch, Symbolic, invert};
 pub(crate) use factor_values::Factor;
+pub(crate) use lattice_modes::LatticeModes;
 pub(crate) use rigid_mode::{SLENDER, rigid_mobility};
 
 pub(crate) use factor_cache::{FactorCache, FactorId, SystemFactor, columns_pay};
