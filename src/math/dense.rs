@@ -209,6 +209,15 @@ fn kept_apart<const N: usize>(sums: [Lane; N]) -> [Lane; N] {
     std::hint::black_box(sums)
 }
 
+/// Makes a square matrix of order n symmetric: by columns, what stands below the diagonal above it too.
+pub(crate) fn copy_lower_to_upper(values: &mut [f64], n: usize) {
+    for j in 0..n {
+        for i in j + 1..n {
+            values[n * i + j] = values[n * j + i];
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

@@ -2,11 +2,12 @@
 
 use super::cone::{
     ConeMetric, ConeOperator, ConeProblem, ConeTolerance, GradientBudget, MetricContact, MetricSide,
-    ProjectedGradient, STILL,
+    PointGroup, PointMemory, ProjectedGradient, STILL, Support,
 };
 use super::linear::{BlockMatrix, MODES};
 use super::tests::{brute_force, objective, random_problem};
 use crate::contact::Law;
+use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
 struct Dense<'a>(&'a ConeProblem);
@@ -31,7 +32,7 @@ fn solve(problem: &ConeProblem, products: usize) -> Vec<f64> {
     };
     let mut metric = ConeMetric::default();
     metric.contacts.extend((0..problem.contacts()).map(contact));
-    metric.index_columns();
+    metric.index_pattern();
     let (mut z, mut r) = (vec![0.0; problem.rows()], problem.g.clone());
     let mut method = ProjectedGradient::default();
     method.begin();
@@ -85,11 +86,10 @@ fn with_modes(contacts: usize, size: f64, numbers: &[f64]) -> (ConeMetric, ConeP
             sides: [Some(MetricSide { body: 0, rows }), None],
         }
     };
-    let mut metric = ConeMetric::default();
-    metric.bodies = 1;
-    metric.filled.push((0, 0));
+    let mut metric = ConeMetric { bodies: 1, ..ConeMetric::default() };
+    metric.pattern.filled.push((0, 0));
     metric.contacts.extend((0..contacts).map(contact));
-    metric.index_columns();
+    metric.index_pattern();
     let mut W = BlockMatrix::default();
     W.reset(&[0, n], &[(0, 0)]);
     for (at, w) in W.block_mut(0).iter_mut().enumerate() {
@@ -114,5 +114,56 @@ proptest! {
         let budget = GradientBudget { products: 10, goes_on: true };
         let work = method.solve(&metric, [&mut z, &mut r], tolerance, budget, &mut Dense(&problem));
         prop_assert!(work.error <= tolerance.relative || work.products == 10, "{work:?}");
+    }
+}
+
+proptest! {
+    /// The same modes told as those of one body and, with another basis of them, as those of a lattice's points.
+    #[test]
+    fn modes_are_the_same_in_any_basis(
+        contacts in 1usize..30, size in 0.1..10.0f64, numbers in proptest::collection::vec(-1.0..1.0f64, 60),
+    ) {
+        let (metric, problem) = with_modes(contacts, size, &numbers);
+        let number = |i: usize| numbers[(i * 7919 + 31) % numbers.len()];
+        // V Vᵀ = B S⁻¹ Bᵀ with B = V L and S = Lᵀ L.
+        let L = DMatrix::from_fn(MODES, MODES, |i, j| number(MODES * i + j) + if i == j { 8.0 } else { 0.0 });
+        let S = L.transpose() * &L;
+        let [stiffness, compliance] = [S.clone(), S.try_inverse().unwrap()].map(|S| S.as_slice().to_vec());
+        let mut other = ConeMetric::default();
+        other.contacts.extend(metric.contacts.iter().map(|contact| MetricContact { sides: [None; 2], ..*contact }));
+        let lattice = &mut other.lattice;
+        for contact in &metric.contacts {
+            lattice.starts.push(lattice.supports.len());
+            let V = contact.sides[0].as_ref().unwrap().rows.map(|row| DVector::from_fn(MODES, |m, _| row[m / 4].0[m % 4]));
+            let B = V.map(|row| L.transpose() * row);
+            let rows = |point: usize| [0, 1, 2].map(|r: usize| [0, 1, 2].map(|c| B[r][3 * point + c]));
+            lattice.supports.extend((0..MODES / 3).map(|point| Support { group: 0, point, rows: rows(point) }));
+        }
+        lattice.starts.push(lattice.supports.len());
+        lattice.groups.push(PointGroup { first: 0, count: MODES / 3, stiffness, compliance, units: vec![1.0; MODES] });
+        lattice.order.push(0);
+        lattice.pattern.filled.push((0, 0));
+        lattice.pattern.index([MODES].into_iter());
+        lattice.points = MODES / 3;
+        let v: Vec<f64> = (0..problem.rows()).map(number).collect();
+        let [a, b] = [&metric, &other].map(|metric| {
+            let mut out = Vec::new();
+            metric.multiply_modes(&v, (&mut Vec::new(), &mut PointMemory::default()), &mut out);
+            out
+        });
+        let largest = a.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        prop_assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-9 * largest), "{a:?} {b:?}");
+        let solve = |metric: &ConeMetric| {
+            let (mut z, mut r) = (vec![0.0; problem.rows()], problem.g.clone());
+            let mut method = ProjectedGradient::default();
+            method.begin();
+            let tolerance = ConeTolerance { relative: 1e-9, floor: 1e-9 };
+            let budget = GradientBudget { products: 60, goes_on: true };
+            let work = method.solve(metric, [&mut z, &mut r], tolerance, budget, &mut Dense(&problem));
+            (work, objective(&problem, &z))
+        };
+        let ((work, a), (other, b)) = (solve(&metric), solve(&other));
+        prop_assert!(other.error < 1e-6 && other.products <= 2 * work.products + 4, "{other:?} {work:?}");
+        prop_assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{a} {b}");
     }
 }

@@ -10,6 +10,7 @@ mod crowds;
 mod fast;
 mod friction;
 mod impact;
+mod large_bodies;
 mod mass_ratios;
 mod neighbourhood;
 mod overlaps;

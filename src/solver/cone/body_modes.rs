@@ -56,9 +56,9 @@ impl CoarseModes for ConeMetric {
     }
 
     fn reset(&self, factor: &mut BlockFactor) {
-        factor.matrix().reset(&self.rows, &self.filled);
+        factor.matrix().reset(&self.pattern.rows, &self.pattern.filled);
         for body in 0..self.bodies {
-            let block = factor.matrix().block_mut(self.block_of(body, body));
+            let block = factor.matrix().block_mut(self.pattern.block_of(body, body));
             block.iter_mut().step_by(MODES + 1).for_each(|v| *v = 1.0);
         }
     }
@@ -78,14 +78,14 @@ impl CoarseModes for ConeMetric {
         let [a, b] = sides;
         for (k, side) in [a, b].into_iter().enumerate() {
             if let Some(side) = side {
-                let block = self.block_of(side.body, side.body);
+                let block = self.pattern.block_of(side.body, side.body);
                 add_outer(&turned[k][..count], &turned[k][..count], factor.matrix().block_mut(block));
             }
         }
         if let (Some(a), Some(b)) = (a, b) {
             // Of the lower triangle.
             let (row, column) = if a.body > b.body { (0, 1) } else { (1, 0) };
-            let block = self.block_of(a.body.max(b.body), a.body.min(b.body));
+            let block = self.pattern.block_of(a.body.max(b.body), a.body.min(b.body));
             let (x, y) = (&turned[row][..count], &turned[column][..count]);
             let block = factor.matrix().block_mut(block);
             add_outer(x, y, block);

@@ -3,7 +3,8 @@
 //!
 //! Its contact problem has as many unknowns as the bodies have modes, however many contacts there are.
 
-use super::lattice_metric::LatticeMetric;
+use super::coarse_pattern::CoarsePattern;
+use super::lattice_metric::{LatticeMetric, PointMemory};
 use super::problem::{ConeTolerance, spatial};
 use super::projection;
 use crate::contact::Law;
@@ -40,12 +41,7 @@ pub(crate) struct ConeMetric {
     pub contacts: Vec<MetricContact>,
     /// Bodies and proxies with modes.
     pub bodies: usize,
-    /// Their first rows in the coarse matrix, and their number.
-    pub rows: Vec<usize>,
-    /// Blocks of the lower triangle of the coarse matrix and of its factor, column by column.
-    pub filled: Vec<(usize, usize)>,
-    /// First of each column.
-    columns: Vec<usize>,
+    pub pattern: CoarsePattern,
     /// In place of all these where there are large bodies.
     pub lattice: LatticeMetric,
 }
@@ -88,30 +84,23 @@ impl MetricContact {
 }
 
 impl ConeMetric {
-    /// Takes the pattern of [`ConeMetric::filled`] in.
-    pub fn index_columns(&mut self) {
-        self.rows.clear();
-        self.rows.extend((0..=self.bodies).map(|b| MODES * b));
-        self.columns.clear();
-        self.columns.extend((0..self.filled.len()).filter(|&k| self.filled[k].0 == self.filled[k].1));
-        self.columns.push(self.filled.len());
+    /// Takes its pattern in.
+    pub fn index_pattern(&mut self) {
+        self.pattern.index(std::iter::repeat_n(MODES, self.bodies));
     }
 
-    /// Place of a block in the pattern.
-    #[inline(always)]
-    pub fn block_of(&self, row: usize, column: usize) -> usize {
-        let range = self.columns[column]..self.columns[column + 1];
-        let rows = &self.filled[range.clone()];
-        range.start + rows.partition_point(|(i, _)| *i < row)
-    }
-
-    /// `out = V Vᵀ v`; `p` is memory.
-    pub fn multiply_modes(&self, v: &[f64], p: &mut Vec<Modes>, out: &mut Vec<f64>) {
+    /// `out = V Vᵀ v`; `p` and `points` are memory.
+    pub fn multiply_modes(
+        &self,
+        v: &[f64],
+        (p, points): (&mut Vec<Modes>, &mut PointMemory),
+        out: &mut Vec<f64>,
+    ) {
         if self.lattice.points > 0 {
             out.clear();
             let into =
                 |k: usize, moved: [f64; 3]| out.extend_from_slice(&moved[..self.contacts[k].dimension]);
-            return self.lattice.multiply(|k| self.contacts[k].of(v), into);
+            return self.lattice.multiply(|k| self.contacts[k].of(v), points, into);
         }
         p.clear();
         p.resize(self.bodies, STILL);

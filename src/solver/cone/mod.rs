@@ -11,6 +11,7 @@ mod newton;
 mod metric;
 
 mod coarse_newton;
+mod coarse_pattern;
 
 mod body_modes;
 mod lattice_metric;
@@ -24,7 +25,9 @@ mod condensation;
 mod secant;
 
 pub(crate) use condensation::{Condensation, Condensed};
-pub(crate) use lattice_metric::Support;
+#[cfg(test)]
+pub(in crate::solver) use lattice_metric::PointMemory;
+pub(crate) use lattice_metric::{LatticeMetric, PointGroup, Support};
 pub(crate) use metric::{ConeMetric, MetricContact, MetricSide, Modes, STILL};
 pub(crate) use projected_gradient::{ConeOperator, GradientBudget, ProjectedGradient};
 

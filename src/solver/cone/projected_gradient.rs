@@ -4,7 +4,8 @@
 //! W is only ever multiplied with. Every iterate is in its cones and none is worse than the one before, so the method can
 //! be stopped anywhere.
 
-use super::coarse_newton::{CoarseNewton, CoarseProblem};
+use super::coarse_newton::{CoarseNewton, CoarseProblem, LATTICE_STEPS_TO_DESCENT, STEPS, STEPS_TO_DESCENT};
+use super::lattice_metric::PointMemory;
 use super::metric::{ConeMetric, MetricContact, Modes};
 use super::problem::{ConeTolerance, product};
 use crate::contact::Law;
@@ -18,8 +19,10 @@ pub(crate) struct ProjectedGradient {
     Wd: Vec<f64>,
     VVd: Vec<f64>,
     modes: Vec<Modes>,
-    /// Factor on 1/D, kept between the solves of a step.
+    points: PointMemory,
+    /// Factor on 1/D, kept between the solves of a step that have modes of the same kind.
     alpha: f64,
+    has_lattices: bool,
 }
 
 /// What a solve took, and left.
@@ -34,7 +37,7 @@ pub(crate) struct GradientWork {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GradientBudget {
     pub products: usize,
-    /// As [`CoarseProblem::goes_on`].
+    /// As [`CoarseProblem::most_steps`].
     pub goes_on: bool,
 }
 
@@ -82,6 +85,10 @@ impl ProjectedGradient {
     ) -> GradientWork {
         let mut work = GradientWork { products: 0, error: metric.error(z, r, tolerance) };
         let mut brings_back = true;
+        let has_lattices = metric.lattice.points > 0;
+        if std::mem::replace(&mut self.has_lattices, has_lattices) != has_lattices {
+            self.alpha = FIRST_ALPHA;
+        }
         while work.error > tolerance.relative && work.products < products {
             self.choose_direction(metric, [z, r], goes_on);
             let (leads, slope) = self.complete_direction(metric, r, operator, brings_back);
@@ -110,11 +117,19 @@ impl ProjectedGradient {
     fn choose_direction(&mut self, metric: &ConeMetric, [z, r]: [&[f64]; 2], goes_on: bool) {
         let Self { d, VVd, alpha, .. } = self;
         let (contacts, alpha, out) = (&metric.contacts[..], *alpha, [d, VVd]);
+        let most_steps = if goes_on { STEPS_TO_DESCENT } else { STEPS };
         if metric.lattice.points > 0 {
-            let problem = CoarseProblem { modes: &metric.lattice, contacts, z, r, alpha, goes_on: true };
+            let problem = CoarseProblem {
+                modes: &metric.lattice,
+                contacts,
+                z,
+                r,
+                alpha,
+                most_steps: LATTICE_STEPS_TO_DESCENT,
+            };
             self.lattice.solve(&problem, out);
         } else {
-            let problem = CoarseProblem { modes: metric, contacts, z, r, alpha, goes_on };
+            let problem = CoarseProblem { modes: metric, contacts, z, r, alpha, most_steps };
             self.coarse.solve(&problem, out);
         }
     }
@@ -137,7 +152,7 @@ impl ProjectedGradient {
             operator.follow(r, &mut self.d);
             leads = Leads::HeldAlone;
         }
-        metric.multiply_modes(&self.d, &mut self.modes, &mut self.VVd);
+        metric.multiply_modes(&self.d, (&mut self.modes, &mut self.points), &mut self.VVd);
         (leads, product(r, &self.d))
     }
 

@@ -132,8 +132,8 @@ impl CoarseSpace {
         self.sizes.clear();
         self.sizes.resize(metric.bodies, MODES);
         self.elimination.arrange(&self.sizes, &[]);
-        self.elimination.list_filled(&mut metric.filled);
-        metric.index_columns();
+        self.elimination.list_filled(&mut metric.pattern.filled);
+        metric.index_pattern();
         for side in metric.contacts.iter_mut().flat_map(|contact| &mut contact.sides).flatten() {
             side.body = self.elimination.rank[side.body];
         }

@@ -179,7 +179,7 @@ mod tests {
         };
         let mut metric = ConeMetric::default();
         metric.contacts.extend((0..b.len()).map(of));
-        metric.index_columns();
+        metric.index_pattern();
         let (mut z, mut r) = (vec![0.0; b.len()], b.to_vec());
         let mut method = ProjectedGradient::default();
         method.begin();

@@ -7,7 +7,7 @@ use super::factor_values::{Factor, NotPositiveDefinite};
 use super::lower_triangle::LowerTriangle;
 use super::operator::ConjugateScratch;
 use super::supernodes::{Entry, Supernodes};
-use crate::math::lanes::Lane;
+use crate::math::{dense, lanes::Lane};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::matmul;
@@ -368,26 +368,14 @@ pub(crate) fn cholesky(
     .map_err(|_| NotPositiveDefinite)
 }
 
-/// Inverts a dense symmetric matrix of order n, of which only the lower triangle is read, in its place: all of it, and symmetric to the bit.
-pub(crate) fn invert(
-    values: &mut [f64],
-    n: usize,
-    scratch: &mut DenseScratch,
-) -> Result<(), NotPositiveDefinite> {
-    cholesky(values, n, scratch)?;
-    let L = std::mem::take(&mut scratch.0.panel);
-    let (mut L, stack) =
-        (L, scratch.0.stack(llt::inverse::inverse_scratch::<f64>(n, Par::Seq).unaligned_bytes_required()));
-    L.clear();
-    L.extend_from_slice(values);
-    let inverse = MatMut::from_column_major_slice_mut(values, n, n);
-    llt::inverse::inverse(inverse, MatRef::from_column_major_slice(&L, n, n), Par::Seq, stack);
-    scratch.0.panel = L;
-    for j in 0..n {
-        for i in j + 1..n {
-            values[n * i + j] = values[n * j + i];
-        }
-    }
+/// Inverts a dense symmetric matrix of order n, of which only the lower triangle is read, in its place: symmetric to the bit.
+pub(crate) fn invert(v: &mut [f64], n: usize, scratch: &mut DenseScratch) -> Result<(), NotPositiveDefinite> {
+    cholesky(v, n, scratch)?;
+    let L = v.to_vec();
+    let stack = scratch.0.stack(llt::inverse::inverse_scratch::<f64>(n, Par::Seq).unaligned_bytes_required());
+    let L = MatRef::from_column_major_slice(&L, n, n);
+    llt::inverse::inverse(MatMut::from_column_major_slice_mut(v, n, n), L, Par::Seq, stack);
+    dense::copy_lower_to_upper(v, n);
     Ok(())
 }
 

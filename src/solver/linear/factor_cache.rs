@@ -8,9 +8,8 @@ use super::changed_pins::ChangedPins;
 use super::clusters::Clusters;
 use super::coefficients::{dimension, node_inertia};
 use super::compliance_columns::ComplianceColumns;
-use super::factor::{BATCH, FactorScratch, Symbolic};
+use super::factor::{FactorScratch, Symbolic};
 use super::factor_values::Factor;
-use super::lattice_modes::LatticeModes;
 use super::operator::StiffnessOperator;
 use super::system;
 use super::system::FactorKey;
@@ -47,7 +46,7 @@ pub(super) struct Entry {
 
 /// Where a cache keeps a factor, for the present step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct FactorId(usize);
+pub(crate) struct FactorId(pub(super) usize);
 
 /// All factors of a world.
 #[derive(Default)]
@@ -62,7 +61,7 @@ pub(crate) struct FactorCache {
     /// \[bytes\]; and what the bodies of this step have asked for so far.
     column_budget: usize,
     columns_wanted: usize,
-    nodes: Vec<u32>,
+    pub(super) nodes: Vec<u32>,
     pub(super) step: u64,
     made: u64,
 }
@@ -82,8 +81,6 @@ pub(crate) struct CacheWork {
 const COLUMN_WORK: usize = 100_000_000;
 /// So many times as many columns are made in a step of what is attached.
 const ATTACHED_COLUMNS: usize = 4;
-/// Nodes that a body has to be able to pay for to be prepared for contacts.
-const FEW_NODES: usize = 64;
 /// Operations of an iterative solve per node, over those of a number of a factor.
 const ITERATIVE: usize = 3000;
 
@@ -158,34 +155,6 @@ impl FactorCache {
         Some(work)
     }
 
-    /// What products of a large body's contacts are led by, where it has no columns; of one whose pins have changed only affine modes.
-    fn make_lattice(&mut self, id: FactorId, body: &DeformableBody) {
-        let Entry { made: SystemFactor { symbolic, factor, coarse, .. }, key, .. } = &self.factors[id.0];
-        if coarse.modes.is_none() || !matches!(**factor, Factor::Double(_) | Factor::Single(_)) {
-            return;
-        }
-        coarse.make_lattice(|| {
-            LatticeModes::new(&body.model, &key.pins, symbolic, || {
-                system::assemble(&body.model, &body.materials, &key.pins, key.system, key.h(), symbolic)
-            })
-        });
-    }
-
-    /// Makes a body's factor, and the columns of all of its surface if few contacts pay for theirs; as [`Self::prepare`].
-    pub fn prepare_surface(&mut self, key: &FactorKey, body: &DeformableBody) -> Option<CacheWork> {
-        let mut work = self.prepare(key, body, 1, std::iter::empty())?;
-        let Entry { made: SystemFactor { symbolic, factor, .. }, model, .. } = &self.factors[work.id.0];
-        let all = 0..model.surface.nodes.len() as u32;
-        if columns_pay(symbolic, factor, model, FEW_NODES.min(all.len())) {
-            self.nodes.clear();
-            self.nodes.extend(all);
-            work.columns = self.make_columns(work.id);
-        } else {
-            self.make_lattice(work.id, body);
-        }
-        Some(work)
-    }
-
     /// Whether a factor is there, with the one that it is made from.
     fn is_there(&self, key: &FactorKey) -> bool {
         let Some(&place) = self.places.get(key) else { return false };
@@ -199,7 +168,7 @@ impl FactorCache {
     }
 
     /// Makes the columns of `nodes` that are not there; returns how many.
-    fn make_columns(&mut self, id: FactorId) -> usize {
+    pub(super) fn make_columns(&mut self, id: FactorId) -> usize {
         let base = self.base_of(id.0);
         if base.is_some() {
             let own = &self.factors[id.0].made.columns;
@@ -369,24 +338,6 @@ impl FactorCache {
             }
         };
         Some((factor, coarse))
-    }
-
-    /// Makes the columns of the first of these surface nodes that have none: one batch of them, so that
-    /// a coming touch finds them there, or the lattice. Returns how many.
-    pub fn prepare_ahead(&mut self, id: FactorId, body: &DeformableBody, surface_nodes: &[u32]) -> usize {
-        if surface_nodes.is_empty() {
-            return 0;
-        }
-        let Entry { made: SystemFactor { symbolic, factor, columns, system, .. }, model, .. } =
-            &self.factors[id.0];
-        if !columns_pay(symbolic, factor, model, FEW_NODES) {
-            self.make_lattice(id, body);
-            return 0;
-        }
-        let missing = surface_nodes.iter().copied().filter(|s| !columns.has(*s));
-        self.nodes.clear();
-        self.nodes.extend(missing.take(BATCH / dimension(*system)));
-        self.make_columns(id)
     }
 
     /// A factor that was prepared in this step.

@@ -9,8 +9,8 @@ use super::factor::{DenseScratch, Symbolic, invert};
 use crate::fem::DeformableModel;
 use crate::math::Vec3;
 
-/// Numbers of a factor from which on a body has a lattice: 0.8 MB. Below, a coarse problem takes longer than a product.
-const LATTICE_FROM: usize = 100_000;
+/// Numbers of a factor from which on a body has a lattice: 1.2 MB, 2500 tetrahedra. Below, a coarse problem takes as long as several products.
+const LATTICE_FROM: usize = 150_000;
 /// Points of the lattice over the cube root of the numbers of the factor: it takes 2 to 25 % of the time of the factorization.
 const POINTS: f64 = 1.5;
 /// Edges of the mesh in one of its cells, at the least.
@@ -52,11 +52,22 @@ impl LatticeModes {
         let (lowest, highest) = (fold(f64::min), fold(f64::max));
         let most = POINTS * (symbolic.factor_len() as f64).cbrt();
         let cells = cells_of(&(highest - lowest), EDGES * model.surface.mean_edge, most)?;
+        Self::of_cells([lowest, highest], cells, &model.rest, pins, (symbolic, &values()))
+    }
+
+    /// Between two corners.
+    fn of_cells(
+        [lowest, highest]: [Vec3; 2],
+        cells: [usize; 3],
+        rest: &[Vec3],
+        pins: &[u32],
+        (symbolic, values): (&Symbolic, &[f64]),
+    ) -> Option<Self> {
         let density = (highest - lowest).zip_map(&Vec3::from(cells.map(|n| n as f64)), |side, n| n / side);
         let mut pinned = pins.to_vec();
         pinned.sort_unstable();
         let mut lattice = Self { lowest, density, cells, pinned, compliance: Vec::new() };
-        lattice.compliance = lattice.projected(&model.rest, symbolic, &values());
+        lattice.compliance = lattice.projected(rest, symbolic, values);
         lattice.invert().then_some(lattice)
     }
 
@@ -162,4 +173,66 @@ fn cells_of(sides: &Vec3, shortest: f64, most: f64) -> Option<[usize; 3]> {
     };
     (sides.min() > 0.0).then_some(())?;
     (2..).take_while(fits).last().map(cells)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fem::SystemMatrix;
+    use crate::material::DeformableMaterial;
+    use crate::mesh::TetMesh;
+    use crate::solver::linear::{assemble, pattern_of};
+    use nalgebra::{DMatrix, DVector};
+
+    /// A as a matrix, and the lattice's functions, three unknowns a node.
+    fn dense(symbolic: &Symbolic, values: &[f64], nodes: usize) -> DMatrix<f64> {
+        let (d, mut A) = (symbolic.d, DMatrix::zeros(3 * nodes, 3 * nodes));
+        for (j, column) in symbolic.column_starts().windows(2).enumerate() {
+            for k in column[0]..column[1] {
+                let i = symbolic.rows()[k];
+                for c in 0..3 / d {
+                    let at = |unknown: usize| 3 * (unknown / d) + c * usize::from(d == 1) + unknown % d;
+                    (A[(at(i), at(j))], A[(at(j), at(i))]) = (values[k], values[k]);
+                }
+            }
+        }
+        A
+    }
+
+    /// What it says of `A⁻¹` is what is least in energy among its functions, so that no force finds it to yield more than `A⁻¹` does.
+    #[test]
+    fn yields_as_its_functions_do_and_no_more_than_the_body() {
+        let model = DeformableModel::new(&TetMesh::cuboid([0.3, 0.2, 0.2], [6, 4, 4]).unwrap());
+        let material = [DeformableMaterial::new(1e6, 0.3)];
+        let nodes = model.rest.len();
+        let corners = [Vec3::new(-0.3, -0.2, -0.2), Vec3::new(0.3, 0.2, 0.2)];
+        for system in [SystemMatrix::RestStiffness, SystemMatrix::Laplacian] {
+            for pins in [&[][..], &[0, 7, 30]] {
+                let symbolic = pattern_of(&model, system).unwrap();
+                let values = assemble(&model, &material, pins, system, 1.0 / 60.0, &symbolic);
+                let of = (&symbolic, &values[..]);
+                let lattice = LatticeModes::of_cells(corners, [3, 2, 1], &model.rest, pins, of).unwrap();
+                let n = 3 * lattice.len();
+                let mut P = DMatrix::zeros(3 * nodes, n);
+                for i in 0..nodes {
+                    for (point, weight) in lattice.stencil(&model.rest, i) {
+                        (0..3).for_each(|c| P[(3 * i + c, 3 * point + c)] += weight);
+                    }
+                }
+                let (A, C) =
+                    (dense(&symbolic, &values, nodes), DMatrix::from_column_slice(n, n, &lattice.compliance));
+                let off = (P.transpose() * &A * &P * &C - DMatrix::identity(n, n)).amax();
+                assert!(off < 1e-8, "{system:?}, {} pins: {off:e}", pins.len());
+                let factor = A.cholesky().unwrap();
+                for seed in 0..20 {
+                    let number = |k: usize| ((k * 7919 + 31 * seed + 13) % 101) as f64 / 50.0 - 1.0;
+                    let mut force = DVector::from_fn(3 * nodes, |k, _| number(k));
+                    pins.iter().for_each(|&p| force.rows_mut(3 * p as usize, 3).fill(0.0));
+                    let along = P.transpose() * &force;
+                    let [part, whole] = [along.dot(&(&C * &along)), force.dot(&factor.solve(&force))];
+                    assert!(part > 0.0 && part < whole, "{system:?}: {part:e} of {whole:e}");
+                }
+            }
+        }
+    }
 }

@@ -25,6 +25,7 @@ mod lattice_modes;
 mod clusters;
 mod compliance_columns;
 
+mod ahead;
 mod factor_cache;
 mod unused_factors;
 
