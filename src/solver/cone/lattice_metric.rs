@@ -15,8 +15,8 @@ pub(crate) struct Support {
     pub rows: [[f64; 3]; 3],
 }
 
-/// Points of one body or proxy, one after the other, in units in which each of them alone resists with one; and all by one, where there is no
-/// matrix.
+/// Points of one body, one after the other, in units in which each of them alone resists with one. Where a body has no lattice they stand for its
+/// modes, three each, and there is no matrix: S is one.
 #[derive(Debug, Default)]
 pub(crate) struct PointGroup {
     pub first: usize,

@@ -123,12 +123,7 @@ impl CoarseSpace {
 
     /// Puts the bodies into an order of elimination.
     fn arrange(&mut self, metric: &mut ConeMetric) {
-        self.elimination.begin(metric.bodies);
-        for contact in &metric.contacts {
-            if let [Some(a), Some(b)] = &contact.sides {
-                self.elimination.connect(a.body, b.body);
-            }
-        }
+        connect(&mut self.elimination, metric);
         self.sizes.clear();
         self.sizes.resize(metric.bodies, MODES);
         self.elimination.arrange(&self.sizes, &[]);
@@ -144,6 +139,16 @@ impl RigidModes {
     fn row(&self, force: &Vec3, moment: &Vec3) -> Modes {
         let (a, b) = (self.linear.component_mul(force), self.angular.tr_mul(moment));
         [Lane([a.x, a.y, a.z, 0.0]), Lane([b.x, b.y, b.z, 0.0]), Lane::default()]
+    }
+}
+
+/// Begins a graph of the bodies of a metric, in which those that touch are adjacent.
+pub(super) fn connect(elimination: &mut Elimination, metric: &ConeMetric) {
+    elimination.begin(metric.bodies);
+    for contact in &metric.contacts {
+        if let [Some(a), Some(b)] = &contact.sides {
+            elimination.connect(a.body, b.body);
+        }
     }
 }
 

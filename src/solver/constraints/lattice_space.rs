@@ -1,6 +1,6 @@
 //! The metric of islands with large bodies: these have the modes of their lattices, all else those of [`super::coarse_space`].
 
-use super::coarse_space::{CoarseParts, has_affine_modes};
+use super::coarse_space::{CoarseParts, connect, has_affine_modes};
 use super::elimination::Elimination;
 use super::improve::CROWD;
 use super::lists::ActiveContact;
@@ -92,12 +92,7 @@ impl LatticeSpace {
 
     /// Puts places into an order of elimination.
     fn arrange(&mut self, metric: &mut ConeMetric) {
-        self.elimination.begin(metric.bodies);
-        for contact in &metric.contacts {
-            if let [Some(a), Some(b)] = &contact.sides {
-                self.elimination.connect(a.body, b.body);
-            }
-        }
+        connect(&mut self.elimination, metric);
         self.sizes.clear();
         self.sizes.extend(self.near[..metric.bodies].iter().map(|near| 3 * near.len()));
         self.elimination.arrange(&self.sizes, &[]);

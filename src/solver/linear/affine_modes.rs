@@ -70,7 +70,7 @@ impl CoarseInverse {
     /// As [`Self::local`], in the memory of another.
     pub fn set_local(&mut self, pins: &[u32], symbolic: &Symbolic, values: &[f64]) {
         symbolic.upper(values).set_local_compliance(&mut self.local, symbolic.d, pins);
-        self.modes = None;
+        (self.modes, self.lattice) = (None, OnceLock::new());
     }
 }
 
