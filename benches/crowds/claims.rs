@@ -65,7 +65,7 @@ const CLAIMS: &[Claim] = &[
     claim("first touch, 13720 tets", BYTES, 0.5),
     claim("first touch, 34295 tets", TOUCH, 7.1),
     claim("first touch, 34295 tets", BYTES, 0.5),
-    claim("slab of 289 contacts, 2560 tets", TOUCH, 6.2),
+    claim("slab of 289 contacts, 2560 tets", TOUCH, 9.3),
     claim("slab of 289 contacts, 2560 tets", BYTES, 0.5),
     claim("slab of 1024 contacts, 9610 tets", TOUCH, 7.9),
     claim("slab of 1024 contacts, 9610 tets", MEAN, 0.20),
