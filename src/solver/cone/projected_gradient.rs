@@ -117,20 +117,12 @@ impl ProjectedGradient {
     fn choose_direction(&mut self, metric: &ConeMetric, [z, r]: [&[f64]; 2], goes_on: bool) {
         let Self { d, VVd, alpha, .. } = self;
         let (contacts, alpha, out) = (&metric.contacts[..], *alpha, [d, VVd]);
-        let most_steps = if goes_on { STEPS_TO_DESCENT } else { STEPS };
         if metric.lattice.points > 0 {
-            let problem = CoarseProblem {
-                modes: &metric.lattice,
-                contacts,
-                z,
-                r,
-                alpha,
-                most_steps: LATTICE_STEPS_TO_DESCENT,
-            };
-            self.lattice.solve(&problem, out);
+            let (modes, most_steps) = (&metric.lattice, LATTICE_STEPS_TO_DESCENT);
+            self.lattice.solve(&CoarseProblem { modes, contacts, z, r, alpha, most_steps }, out);
         } else {
-            let problem = CoarseProblem { modes: metric, contacts, z, r, alpha, most_steps };
-            self.coarse.solve(&problem, out);
+            let most_steps = if goes_on { STEPS_TO_DESCENT } else { STEPS };
+            self.coarse.solve(&CoarseProblem { modes: metric, contacts, z, r, alpha, most_steps }, out);
         }
     }
 

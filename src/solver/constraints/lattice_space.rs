@@ -57,7 +57,7 @@ impl LatticeSpace {
         let numbers: usize =
             bodies.clone().map(|b| parts.factors.of(b, &parts.bodies[b]).symbolic.factor_len()).sum();
         let points: usize = self.near[..metric.bodies].iter().map(Vec::len).sum();
-        let work = self.work(metric, contacts, places, parts);
+        let work = self.work(metric, contacts, parts);
         if work > SHARE * numbers as f64 || !self.make_groups(metric, places, parts) {
             return false;
         }
@@ -67,18 +67,12 @@ impl LatticeSpace {
     }
 
     /// Of a factorization of the coarse problem, and of making its matrix.
-    fn work(
-        &self,
-        metric: &ConeMetric,
-        contacts: &[ActiveContact],
-        places: &[Option<usize>],
-        parts: CoarseParts<'_>,
-    ) -> f64 {
+    fn work(&self, metric: &ConeMetric, contacts: &[ActiveContact], parts: CoarseParts<'_>) -> f64 {
         let LatticeMetric { order, pattern, .. } = &metric.lattice;
         let size = |rank: usize| 3.0 * self.near[order[rank]].len() as f64;
         let factor: f64 = pattern.filled.iter().map(|&(i, j)| size(i) * size(j) * size(j)).sum();
         let points = |endpoint: &Endpoint| match endpoint {
-            Endpoint::Soft { body, .. } if lattice_of(parts, *body).is_some() && places[*body].is_some() => {
+            Endpoint::Soft { body, .. } if lattice_of(parts, *body).is_some() => {
                 8 * endpoint.soft_nodes().count()
             }
             _ => AFFINE_POINTS,
@@ -178,7 +172,7 @@ impl LatticeSpace {
             }
             made.0 = serial;
             made.1.clone_from(near);
-            if !self.scratch.make_group(lattice, near, group) {
+            if !make_group(lattice, near, group, &mut self.scratch) {
                 group.stiffness.clear();
                 return false;
             }
@@ -254,26 +248,29 @@ impl LatticeSpace {
     }
 }
 
-impl DenseScratch {
-    /// Sets what the points near contacts yield by and resist with, each in the unit in which it alone resists with one.
-    fn make_group(&mut self, lattice: &LatticeModes, near: &[usize], group: &mut PointGroup) -> bool {
-        let PointGroup { stiffness, compliance, units, .. } = group;
-        lattice.compliance_of(near, compliance);
-        stiffness.clone_from(compliance);
-        let n = 3 * near.len();
-        if invert(stiffness, n, self).is_err() {
-            return false;
-        }
-        units.clear();
-        units.extend(stiffness.iter().step_by(n + 1).map(|s| 1.0 / s.sqrt()));
-        for (j, column) in units.iter().enumerate() {
-            for (i, row) in units.iter().enumerate() {
-                stiffness[n * j + i] *= row * column;
-                compliance[n * j + i] /= row * column;
-            }
-        }
-        units.iter().all(|unit| unit.is_finite())
+/// Sets what the points near contacts yield by and resist with, each in the unit in which it alone resists with one.
+fn make_group(
+    lattice: &LatticeModes,
+    near: &[usize],
+    group: &mut PointGroup,
+    scratch: &mut DenseScratch,
+) -> bool {
+    let PointGroup { stiffness, compliance, units, .. } = group;
+    lattice.compliance_of(near, compliance);
+    stiffness.clone_from(compliance);
+    let n = 3 * near.len();
+    if invert(stiffness, n, scratch).is_err() {
+        return false;
     }
+    units.clear();
+    units.extend(stiffness.iter().step_by(n + 1).map(|s| 1.0 / s.sqrt()));
+    for (j, column) in units.iter().enumerate() {
+        for (i, row) in units.iter().enumerate() {
+            stiffness[n * j + i] *= row * column;
+            compliance[n * j + i] /= row * column;
+        }
+    }
+    units.iter().all(|unit| unit.is_finite())
 }
 
 /// The lattice of a body, if it has one, and no columns: then it was asked for in this step, whatever there was before.

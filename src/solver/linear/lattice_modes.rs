@@ -49,8 +49,8 @@ impl LatticeModes {
         if symbolic.factor_len() < LATTICE_FROM || !model.is_solid() {
             return None;
         }
-        let fold = |f: fn(f64, f64) -> f64| model.rest.iter().fold(model.rest[0], |a, x| a.zip_map(x, f));
-        let (lowest, highest) = (fold(f64::min), fold(f64::max));
+        let start = (model.rest[0], model.rest[0]);
+        let (lowest, highest) = model.rest.iter().fold(start, |(low, high), x| (low.inf(x), high.sup(x)));
         let most = POINTS * (symbolic.factor_len() as f64).cbrt();
         let cells = cells_of(&(highest - lowest), EDGES * model.surface.mean_edge, most)?;
         Self::of_cells([lowest, highest], cells, &model.rest, pins, (symbolic, &values()))
