@@ -175,10 +175,14 @@ impl ContactSystem {
         changed
     }
 
-    /// Whether no node moves farther in the step, and nothing overlaps deeper, than a small part of the edges.
     fn is_still(&self, bodies: &[BodyProblem], h: f64) -> bool {
+        self.is_slower_than(STILL, bodies, h)
+    }
+
+    /// Whether no node moves farther in the step, and nothing overlaps deeper, than a part of the edges.
+    pub(super) fn is_slower_than(&self, part: f64, bodies: &[BodyProblem], h: f64) -> bool {
         let shortest = bodies.iter().map(|b| b.model.surface.mean_edge).fold(f64::INFINITY, f64::min);
-        let (far, fast) = (STILL * shortest, STILL * shortest / h);
+        let (far, fast) = (part * shortest, part * shortest / h);
         let is_slow = |body: &BodyProblem| body.v_start.iter().all(|v| v.norm_squared() <= fast * fast);
         bodies.iter().all(is_slow) && self.constraints().all(|c| c.target_gap >= -far)
     }

@@ -3,7 +3,7 @@
 
 use super::coarse_space::CoarseParts;
 use super::held_rows::{HeldRows, Holding};
-use super::improve::{Around, LOOSE};
+use super::improve::{Around, CROWD, LOOSE};
 use super::matrix_free::MatrixFree;
 use super::system::{Change, ContactSystem, FreeSolve};
 use crate::solver::body_step::BodyProblem;
@@ -22,6 +22,15 @@ const PRODUCT_COST: usize = 2;
 const HELD_PRODUCTS: usize = 4;
 /// Part of its first error that a solve leaves to the next outer iteration.
 const REDUCTION: f64 = 0.1;
+/// Error that a solve may leave where a crowd comes to rest, which has no next iteration: what does not bend has converged after the first.
+/// Of 23 piles of 12 to 34 bodies of 1e6 Pa five lay 4e-5 to 1.5e-4 m in one another, in 800 steps at rest, without it; with it none is deeper
+/// than 1.1e-5, for 4 % more time (few bodies are not deep without: a slab of 625
+/// contacts that lands takes 59 products, not 34). With 1e-3 four steps of ten such piles are deeper than that, up to 6e-5; with 1e-4 one, in the same time.
+const AT_REST: f64 = 3.0e-4;
+/// Edges, per step, below which a crowd comes to rest. With 0.01 seven steps of those piles are deeper, up to 3e-5; with 0.1 one, for 5 %.
+const COMING_TO_REST: f64 = 0.05;
+/// Solves with a fresh shift there. With as few as of what moves, four steps are deeper.
+const RESTING_ROUNDS: usize = 8;
 
 /// How far one solve goes.
 #[derive(Clone, Copy)]
@@ -38,7 +47,13 @@ impl ContactSystem {
         self.set_gradient(around.tolerance);
         // Loose ones go all the way at once: a preview has no next outer iteration.
         let is_loose = around.tolerance.relative > LOOSE;
-        let error = if is_loose { around.tolerance.relative } else { REDUCTION * self.work.error };
+        let comes_to_rest =
+            bodies.len() >= CROWD && self.is_slower_than(COMING_TO_REST, bodies, around.context.h);
+        let (error, rounds) = match (is_loose, REDUCTION * self.work.error) {
+            (true, _) => (around.tolerance.relative, SHIFT_ROUNDS),
+            (false, left) if comes_to_rest => (left.min(AT_REST), RESTING_ROUNDS),
+            (false, left) => (left, SHIFT_ROUNDS),
+        };
         // Under rigid loads solves that end where four steps of a coarse problem show no descent leave forces off by six times their size.
         // Without any, a foot of 1e4 Pa under 128 kg that goes on goes 9 cm into the floor at 5 m/s and 1/30 s (`tests/solids/regions.rs` allows 6).
         let goes_on = self.has_loads(around.context);
@@ -46,7 +61,7 @@ impl ContactSystem {
         // solid cube with a box on it 2.5 times as long; not from the start, twice as many cloths that a box hangs from have their steps rejected.
         let has_thin = bodies.iter().any(|body| !body.model.is_solid());
         let mut changed = false;
-        for round in 0..SHIFT_ROUNDS {
+        for round in 0..rounds {
             if (round > 0 || has_thin) && self.is_far_from_solved() {
                 self.solve_for_held(bodies, around);
             }
