@@ -53,9 +53,9 @@ pub(crate) struct Detector {
 }
 
 impl Detector {
-    /// Prepares for a body: positions `x` at the start of the step, where its nodes would go
-    /// without contact (`target`).
-    pub fn begin(&mut self, model: &DeformableModel, x: &[Vec3], target: &[Vec3]) {
+    /// Prepares for a body: positions `x` at the start of the step, where its nodes would go without contact (`target`), and how much farther they may be
+    /// taken (`lead`).
+    pub fn begin(&mut self, model: &DeformableModel, x: &[Vec3], target: &[Vec3], lead: f64) {
         let surface = &model.surface;
         self.normals.clear();
         self.normals.resize(surface.nodes.len(), Vec3::zeros());
@@ -77,7 +77,7 @@ impl Detector {
         self.found.clear();
         // A node whose triangles cancel has no outside; any direction serves.
         self.normals.iter_mut().for_each(|n| *n = n.try_normalize(0.0).unwrap_or(Vec3::y()));
-        let margin = STATIC_MARGIN * surface.mean_edge;
+        let margin = STATIC_MARGIN * surface.mean_edge + lead;
         self.motions.clear();
         self.motions.extend(surface.nodes.iter().map(|&n| target[n as usize] - x[n as usize]));
         let skins = surface.nodes.iter().map(|&n| model.half_thickness[n as usize]);

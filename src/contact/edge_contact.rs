@@ -96,7 +96,7 @@ pub(super) fn crossing(
 
 /// How far the farther of two nodes may come \[m\].
 fn reach_of(s: &SoftSurface<'_>, ends: [usize; 2]) -> f64 {
-    ends.map(|n| s.reach[s.model.surface.index_of_node[n] as usize]).into_iter().fold(0.0, f64::max)
+    ends.map(|n| s.reach_of(n)).into_iter().fold(0.0, f64::max)
 }
 
 /// Half thickness at a place between two nodes \[m\].

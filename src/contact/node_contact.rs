@@ -45,8 +45,7 @@ pub(super) fn on_triangle(
         return None;
     }
     let height = normal.dot(&(x - a));
-    let index = |n: usize| other.model.surface.index_of_node[n] as usize;
-    let reach = own.reach[s] + nodes.iter().fold(0.0, |r: f64, &n| r.max(other.reach[index(n)]));
+    let reach = own.reach_of(node) + nodes.iter().fold(0.0, |r: f64, &n| r.max(other.reach_of(n)));
     if !(height < reach && height > -DEEPEST * other.model.surface.mean_edge) {
         return None;
     }

@@ -318,7 +318,7 @@ mod tests {
             });
             let surface = |k: usize| SoftSurface {
                 body: k, key: k as u64, model: &model, x: x[k], target: x[k],
-                faces: &[], normals: &[], reach: &[], tree: &trees[k],
+                faces: &[], normals: &[], reach: &[], withheld: 0.0, tree: &trees[k],
             };
             let mut detector = SoftDetector::default();
             detector.collect([&surface(0), &surface(1)], false);

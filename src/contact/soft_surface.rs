@@ -27,7 +27,16 @@ pub(crate) struct SoftSurface<'a> {
     /// Per surface node: the body's normal, and how far the node may come.
     pub normals: &'a [Vec3],
     pub reach: &'a [f64],
+    /// What of that is not for soft bodies \[m\].
+    pub withheld: f64,
     pub tree: &'a SurfaceTree,
+}
+
+impl SoftSurface<'_> {
+    /// How far a node may come towards another soft body \[m\].
+    pub(super) fn reach_of(&self, node: usize) -> f64 {
+        self.reach[self.model.surface.index_of_node[node] as usize] - self.withheld
+    }
 }
 
 /// Two bodies that may touch: filters have been passed and coefficients combined.

@@ -11,6 +11,7 @@ mod fast;
 mod friction;
 mod impact;
 mod large_bodies;
+mod led;
 mod mass_ratios;
 mod neighbourhood;
 mod overlaps;

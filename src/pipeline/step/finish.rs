@@ -1,10 +1,10 @@
 //! The end of a step: the bodies store what was solved, and those that have been still fall asleep.
 
+use super::island_work::IslandWork;
 use super::quarantine::quarantine;
 use super::readout::{Lists, read_results};
 use super::scratch::StepScratch;
 use super::sleeping::LookAround;
-use super::work::IslandWork;
 use crate::body::{
     DeformableAttachment, DeformableBody, DeformableBodyHandle, DeformableBodySet, DeformableContact,
     DeformablePairContact, DeformableState, Integrator, is_number,

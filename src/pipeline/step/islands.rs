@@ -1,7 +1,8 @@
 //! Which bodies have to be solved together: those that touch the same yielding proxy, directly or
 //! through attachments or the rigid neighbourhood.
 
-use super::work::{BodyWork, IslandWork};
+use super::island_work::IslandWork;
+use super::work::BodyWork;
 use crate::contact::{Constraint, Endpoint};
 use crate::solver::RigidProxies;
 

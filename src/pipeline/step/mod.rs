@@ -9,6 +9,7 @@
 mod quarantine;
 mod tunnelling;
 
+mod island_work;
 mod work;
 
 mod events;

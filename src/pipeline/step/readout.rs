@@ -1,6 +1,6 @@
 //! What users can read of a step, gathered from the islands.
 
-use super::work::IslandWork;
+use super::island_work::IslandWork;
 use crate::body::{
     CableRow, ConstraintKey, DeformableAttachmentHandle, DeformableBodyHandle, DeformableBodySet,
     DeformableCableHandle, DeformableContact, DeformablePairContact, JointRole,

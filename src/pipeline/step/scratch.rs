@@ -1,10 +1,11 @@
 //! What a step works in: memory and caches, nothing that results depend on.
 
 use super::events::Touching;
+use super::island_work::IslandWork;
 use super::islands::Grouping;
 use super::sleeping::Sleeping;
 use super::soft_pairs::SoftPairDetection;
-use super::work::{BodyWork, IslandWork};
+use super::work::BodyWork;
 use crate::body::{DeformableBodyHandle, DeformableContact, DeformablePairContact, PrescribedNode};
 use crate::contact::{Candidates, Constraint, ProxyId};
 use crate::coupling::{RapierScene, Reactions, RigidNeighbourhood};

@@ -1,6 +1,6 @@
 //! Who sleeps and who wakes.
 
-use super::work::IslandWork;
+use super::island_work::IslandWork;
 use crate::body::{DeformableBody, DeformableBodyHandle, DeformableBodySet, Partner, Surroundings};
 use crate::contact::{Candidates, Law};
 use crate::coupling::{RapierScene, RapierSets, StepContext, collider_handle, packed};

@@ -3,11 +3,16 @@
 use super::generalized_alpha::{SCALE, alpha_step};
 use super::problem::{BodyProblem, Iterate, SECOND_ORDER, Scheme};
 use crate::body::{DeformableBody, Integrator, PrescribedNode, SolverSettings, StepState};
+use crate::contact::STATIC_MARGIN;
 use crate::fem::StiffnessDamping;
 use crate::math::{Mat3, Vec3};
 use crate::solver::counters::SolveCounters;
 use crate::solver::linear::{FactorId, FactorKey, Preconditioner};
 use std::sync::Arc;
+
+/// Mean edges by which pins may take their body along in a step, at the most: it looks for contacts as far, all around. A pad of 0.12 m pressed by a
+/// tenth takes 0.4 of them, one on a hand that starts at 1 m/s 0.7 at 1/60 s.
+const MOST_LED: f64 = 2.0;
 
 impl BodyProblem {
     /// Of a body at the start of a step of `h` \[s\] under `gravity` [m/s²], with the nodes that attachments prescribe.
@@ -39,6 +44,7 @@ impl BodyProblem {
             start_elastic: None,
             spin: Vec3::zeros(),
             target: Vec::new(),
+            lead: 0.0,
             masses: Vec::new(),
             damping: StiffnessDamping::default(),
             impacts: Vec::new(),
@@ -208,5 +214,17 @@ impl BodyProblem {
         for (node, target) in pins.chain(self.prescribed.iter().map(|p| (p.node, p.target))) {
             self.target[node as usize] = target;
         }
+        self.measure_lead();
+    }
+
+    /// Pins that begin to go take other nodes along, within the step: pads that were led 6 mm onto a box 2 mm away found no contact, and were stopped by
+    /// it as what tunnels. What is put farther away than the body is large is not led there.
+    fn measure_lead(&mut self) {
+        let goes_on = |i: usize| self.x_start[i] + self.v_start[i] * self.h;
+        let more = |pin: &u32| (self.target[*pin as usize] - goes_on(*pin as usize)).norm();
+        let most = self.key.pins.iter().map(more).fold(0.0, f64::max);
+        let edge = self.model.surface.mean_edge;
+        let counts = most > STATIC_MARGIN * edge && most <= self.model.size;
+        self.lead = if counts { most.min(MOST_LED * edge) } else { 0.0 };
     }
 }

@@ -86,6 +86,8 @@ pub(crate) struct BodyProblem {
     pub(super) spin: Vec3,
     /// Where the nodes would go without internal and contact forces.
     pub target: Vec<Vec3>,
+    /// How much farther its pins take the body than it goes by itself \[m\].
+    pub lead: f64,
     pub(super) masses: Vec<f64>,
     pub(super) damping: StiffnessDamping,
     /// Those that have not ended.
