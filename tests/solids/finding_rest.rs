@@ -122,6 +122,8 @@ fn rest_is_that_of_damped_dynamics_in_a_tenth_of_the_steps() {
         assert!(rest.is_found, "{name}: {rest:?}");
         assert!(off < near, "{name}: {off:e} m");
         assert!(10 * rest.steps <= steps, "{name}: {} of {steps}", rest.steps);
+        // One step that is pressed, and two that are solved more exactly; eight where the first finds no contact and is taken back.
+        assert!(name != "gripped" || rest.steps <= 5, "{name}: {} steps", rest.steps);
         // Nothing else is as it was not.
         let (_, body) = world.bodies.iter().next().unwrap();
         assert_eq!((body.settings(), body.can_sleep(), body.max_speed()), (&precise(), false, 0.0));
