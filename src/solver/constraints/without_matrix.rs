@@ -24,8 +24,8 @@ const HELD_PRODUCTS: usize = 4;
 const REDUCTION: f64 = 0.1;
 /// Error that a solve may leave where a crowd comes to rest, which has no next iteration: what does not bend has converged after the first.
 /// Of 23 piles of 12 to 34 bodies of 1e6 Pa five lay 4e-5 to 1.5e-4 m in one another, in 800 steps at rest, without it; with it none is deeper
-/// than 1.1e-5, for 4 % more time (few bodies are not deep without: a slab of 625
-/// contacts that lands takes 59 products, not 34). With 1e-3 four steps of ten such piles are deeper than that, up to 6e-5; with 1e-4 one, in the same time.
+/// than 1.1e-5, for 4 % more time. With 1e-3 four steps of ten such piles are deeper than that, up to 6e-5; with 1e-4 one, in the same time. Few bodies
+/// are not deep without it: with it, a slab of 625 contacts that lands takes 59 products, not 34.
 const AT_REST: f64 = 3.0e-4;
 /// Edges, per step, below which a crowd comes to rest. With 0.01 seven steps of those piles are deeper, up to 3e-5; with 0.1 one, for 5 %.
 const COMING_TO_REST: f64 = 0.05;
