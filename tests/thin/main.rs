@@ -14,6 +14,7 @@ mod orthotropic;
 mod rod_twist;
 mod section_forces;
 mod sheet_bending;
+mod stacked;
 mod stiffness;
 mod twist_limits;
 mod wind;
