@@ -6,7 +6,7 @@ use crate::math::Vec3;
 use crate::solver::linear::SystemFactor;
 
 /// Share of a body's energy that a step of one iteration may make: such steps gain up to 3 % and lose it in the next
-/// ones. A body that may take n iterations (`max_iterations`, not those it took) may make the n-th part.
+/// ones. A body that may take n iterations (`max_iterations`, not those it took, nor those it went on for) may make the n-th part.
 const MAX_GAIN: f64 = 0.04;
 
 /// As [`MAX_GAIN`], of the work that contacts do on the body.
