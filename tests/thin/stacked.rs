@@ -2,6 +2,7 @@
 use crate::common::soft_bodies::{deepest, fastest};
 use crate::common::*;
 use foible3d::prelude::*;
+use rapier3d::parry::utils::Array2;
 use rapier3d::prelude::*;
 
 /// \[m\].
@@ -84,4 +85,32 @@ fn sheets_of_other_materials_and_steps_do_so_too() {
     }
     falls_and_stands(Stack { friction: 1.0, ..PAIR });
     falls_and_stands(Stack { count: 3, friction: 0.0, ..PAIR });
+}
+
+/// Two fall onto a heightfield of slopes of up to one in two. Once 85 of 300 steps were rejected, and in one of them their energy doubled.
+#[test]
+fn two_sheets_that_fall_onto_hills_stay_out_of_one_another() {
+    let mut physics = PhysicsWorld::new();
+    let heights = (0..81).map(|k| 0.03 * ((k * 7) % 5) as f32).collect();
+    let hills = ColliderBuilder::heightfield(Array2::new(9, 9, heights), Vector::new(2.0, 1.0, 2.0));
+    physics.insert(RigidBodyBuilder::fixed(), hills.friction(0.5));
+    let mut world = DeformableWorld::new();
+    for k in 0..2 {
+        let sheet = DeformableBodyBuilder::cloth([0.25; 2], [10; 2], THICKNESS as f32)
+            .translation(Vector::new(0.0, 0.3 + 0.12 * k as f32, 0.0))
+            .material(DeformableMaterial::new(1.0e6, 0.3).friction(0.5));
+        world.insert(sheet).unwrap();
+    }
+    let (mut rejected, mut most) = (0, 0.0f64);
+    let energy =
+        |world: &DeformableWorld| world.bodies.iter().map(|(_, body)| total_energy(body)).sum::<f64>();
+    let at_first = energy(&world);
+    for _ in 0..150 {
+        world.step(&mut physics);
+        rejected += world.bodies.iter().filter(|(_, body)| body.last_step_rejected()).count();
+        most = most.max(energy(&world));
+    }
+    assert!(rejected < 10, "{rejected} rejected");
+    assert!(most < 1.001 * at_first, "{most} of {at_first} J");
+    assert!(deepest(&world) > -1.0e-4, "{:e} m in one another", deepest(&world));
 }
