@@ -243,8 +243,8 @@ pub struct SolverSettings {
     pub clusters: usize,
     /// Global iterations at the most, at least one; of [`Solver::Automatic`] a tenth where it takes Newton's method, three tenths in contact,
     /// rounded up. Bodies that touch one rigid body are solved together: the largest limit among them counts. Two to five
-    /// bodies that are solved together take up to four times as many, a hundred at the most, while a sheet or rope with [`Solver::Newton`] and a `tolerance`
-    /// above zero is far from solved.
+    /// bodies that are solved together and go no farther than an edge in the step take up to four times as many, a hundred at the most, while a sheet or
+    /// rope with [`Solver::Newton`] and a `tolerance` above zero is far from solved.
     pub max_iterations: usize,
     /// Iterate until the largest residual force is below this fraction of the largest force on a
     /// node (weight, internal or contact force, whichever is largest).

@@ -77,9 +77,9 @@ impl BodyProblem {
         gained
     }
 
-    /// Whether no node begins by going farther than half an edge of the surface in the step.
-    pub fn starts_slowly(&self) -> bool {
-        let far = 0.5 * self.model.surface.mean_edge / self.h;
+    /// Whether no node begins by going farther than so many edges of the surface in the step.
+    pub fn starts_within(&self, edges: f64) -> bool {
+        let far = edges * self.model.surface.mean_edge / self.h;
         self.v_start.iter().all(|v| v.norm_squared() <= far * far)
     }
 
