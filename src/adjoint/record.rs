@@ -235,7 +235,7 @@ fn is_woven_damped(body: &DeformableBody) -> bool {
 
 fn check_step(body: &DeformableBody, solved: &SolvedBody<'_>) -> Result<(), &'static str> {
     let problem = solved.problem;
-    let is_solved = problem.residual() <= SOLVED * problem.force_scale() && solved.contact_error <= SOLVED;
+    let is_solved = problem.is_solved_to(SOLVED) && solved.contact_error <= SOLVED;
     let end = |c: &SolvedContact<'_>| c.constraint.frame[0].dot(&c.motion) + c.constraint.target_gap;
     let near = SETTLED * body.model.surface.mean_edge;
     let is_settled = solved.contacts.iter().filter(carries).all(|contact| end(contact).abs() <= near);

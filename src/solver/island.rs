@@ -159,22 +159,20 @@ impl Island {
         self.contacts.is_settling = false;
     }
 
-    /// Whether a step takes more iterations than its own: of a few bodies that are not fast, where a sheet or a rope is far from where its forces would have it and contacts
-    /// have some of their budget left. Two sheets of 121 vertices that fall flat on one another have residuals of 0.1 to 0.4 after three iterations, and
-    /// one was rejected in every step from then on.
+    /// Whether a step takes more iterations than its own: of a few bodies that are not fast, where a sheet or a rope is far from where its forces would have
+    /// it and contacts have some of their budget left. Two sheets of 121 vertices that fall flat on one another have residuals of 0.1 to 0.4 after three
+    /// iterations, and one was rejected in every step from then on.
     fn goes_on(&self) -> bool {
         // A tolerance of zero asks for its iterations and no others.
-        let may_go_on = |body: &BodyProblem| {
-            !body.model.is_solid() && body.settings.solver == Solver::Newton && body.settings.tolerance > 0.0
-        };
         let is_far = |body: &BodyProblem| {
-            !(body.residual() <= body.settings.tolerance.max(FAR_FROM_SOLVED) * body.force_scale())
+            let tolerance = body.settings.tolerance;
+            is_thin_by_newton(body) && tolerance > 0.0 && !body.is_solved_to(tolerance.max(FAR_FROM_SOLVED))
         };
         (2..CROWD).contains(&self.bodies.len())
             && !self.contacts.is_empty()
             && !self.contacts.work.is_exhausted
+            && self.bodies.iter().any(is_far)
             && self.bodies.iter().all(|body| body.starts_within(SLOW_ENOUGH))
-            && self.bodies.iter().any(|body| may_go_on(body) && is_far(body))
     }
 
     /// Does steps in contact of the second order that have gained energy again by implicit Euler.
@@ -220,8 +218,7 @@ impl Island {
         // Between several bodies such steps end in worse: one of a rope and a film of 1e6 Pa made a tenth of the energy of their impact. What
         // is faster stops at what it meets as a rigid body: the corner of a cloth of 100 m/s came 4 cm past a ridge of a heightfield, not 2.
         let [body] = &self.bodies[..] else { return };
-        let is_thin = !body.model.is_solid();
-        if !(is_thin && body.settings.solver == Solver::Newton && body.starts_within(0.5)) {
+        if !(is_thin_by_newton(body) && body.starts_within(0.5)) {
             return;
         }
         let own = body.settings.max_iterations;
@@ -371,6 +368,11 @@ impl Island {
         }
         self.report.contacts = self.contacts.work;
     }
+}
+
+/// Whether a body is a sheet or rope that Newton's method solves.
+fn is_thin_by_newton(body: &BodyProblem) -> bool {
+    !body.model.is_solid() && body.settings.solver == Solver::Newton
 }
 
 /// Bodies in contact that do not bend take the plain iteration: it needs two or three steps there,

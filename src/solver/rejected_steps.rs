@@ -77,7 +77,7 @@ impl Island {
         // 1e9 Pa at 100 m/s, against a rope at 1/1000 s, made a sixth of that of the impact.
         let is_solved = !body.has_constant_matrix
             && !self.contacts.is_far_from_solved()
-            && body.residual() <= FAR_FROM_SOLVED * body.force_scale();
+            && body.is_solved_to(FAR_FROM_SOLVED);
         !is_solved && self.would_gain_energy(index, 0.0, context)
     }
 

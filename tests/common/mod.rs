@@ -79,6 +79,11 @@ pub fn total_energy(body: &DeformableBody) -> f64 {
     body.kinetic_energy() + body.elastic_energy() + body.mass() * G * body.center_of_mass()[1]
 }
 
+/// That of all bodies of a world [J].
+pub fn energy_of(world: &DeformableWorld) -> f64 {
+    world.bodies.iter().map(|(_, body)| total_energy(body)).sum()
+}
+
 /// Solved until only rounding is left.
 pub fn converged() -> SolverSettings {
     SolverSettings::default().max_iterations(300).tolerance(1e-9)

@@ -102,7 +102,7 @@ fn throw(c: &Corner) -> Found {
     let mut before = f64::INFINITY;
     for _ in 0..40 {
         world.step(&mut physics);
-        let own: f64 = world.bodies.iter().map(|(_, body)| total_energy(body)).sum();
+        let own = energy_of(&world);
         let of_rigid = rigid.map_or(0.0, |body| {
             let body = &physics.bodies[body];
             f64::from(body.kinetic_energy()) + mass * G * f64::from(body.translation().y)

@@ -289,7 +289,7 @@ fn swing(gap: Option<f32>) -> (f32, f64) {
         let moving =
             0.5 * 8.0 * (body.linvel().length_squared() + 0.08 / 12.0 * body.angvel().length_squared());
         let rigid = f64::from(moving) + 8.0 * G * f64::from(body.translation().y);
-        let energy = rigid + world.bodies.iter().map(|(_, b)| total_energy(b)).sum::<f64>();
+        let energy = rigid + energy_of(&world);
         gained = gained.max(energy - *start.get_or_insert(energy));
     }
     println!("{gap:?}: {worst} of what rows leave of the arc, {gained} J gained, lowest {lowest} m");

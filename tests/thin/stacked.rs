@@ -23,8 +23,13 @@ struct Stack {
 
 const PAIR: Stack = Stack { count: 2, e: 1.0e6, friction: 0.5, apart: 0.14, dt: 1.0 / 60.0 };
 
-/// Lets a stack fall for two seconds: few of the bodies' steps are rejected, none makes energy, and then the sheets are apart, no two at the same height, and the floor
-/// carries them all.
+/// Bodies whose last step was rejected.
+fn count_rejected(world: &DeformableWorld) -> usize {
+    world.bodies.iter().filter(|(_, body)| body.last_step_rejected()).count()
+}
+
+/// Lets a stack fall for two seconds: few of the bodies' steps are rejected, none makes energy, and then the sheets are apart, no two at the same height,
+/// and the floor carries them all.
 fn falls_and_stands(stack: Stack) {
     let (mut physics, floor) = world_with_floor(stack.dt);
     let mut world = DeformableWorld::new();
@@ -36,16 +41,14 @@ fn falls_and_stands(stack: Stack) {
             .material(DeformableMaterial::new(stack.e, 0.3).friction(stack.friction));
         world.insert(sheet).unwrap();
     }
-    let energy =
-        |world: &DeformableWorld| world.bodies.iter().map(|(_, body)| total_energy(body)).sum::<f64>();
-    let (at_first, mut before) = (energy(&world), energy(&world));
+    let (at_first, mut before) = (energy_of(&world), energy_of(&world));
     let (mut rejected, mut worst) = (0, 0.0f64);
     for _ in 0..(2.0 / stack.dt).round() as usize {
         world.step(&mut physics);
-        let now = energy(&world);
+        let now = energy_of(&world);
         worst = worst.max((now - before) / at_first);
         before = now;
-        rejected += world.bodies.iter().filter(|(_, body)| body.last_step_rejected()).count();
+        rejected += count_rejected(&world);
     }
     assert!(rejected < 3, "{stack:?}: {rejected} rejected");
     // Where overlaps are undone; three without friction make 1.3e-3 in one step.
@@ -102,13 +105,11 @@ fn two_sheets_that_fall_onto_hills_stay_out_of_one_another() {
         world.insert(sheet).unwrap();
     }
     let (mut rejected, mut most) = (0, 0.0f64);
-    let energy =
-        |world: &DeformableWorld| world.bodies.iter().map(|(_, body)| total_energy(body)).sum::<f64>();
-    let at_first = energy(&world);
+    let at_first = energy_of(&world);
     for _ in 0..150 {
         world.step(&mut physics);
-        rejected += world.bodies.iter().filter(|(_, body)| body.last_step_rejected()).count();
-        most = most.max(energy(&world));
+        rejected += count_rejected(&world);
+        most = most.max(energy_of(&world));
     }
     assert!(rejected < 10, "{rejected} rejected");
     assert!(most < 1.001 * at_first, "{most} of {at_first} J");

@@ -57,7 +57,7 @@ impl BodyProblem {
         if self.is_alpha() {
             return self.gained_much(true);
         }
-        let is_solved = self.residual() <= self.settings.tolerance.max(HARMLESS) * self.force_scale();
+        let is_solved = self.is_solved_to(self.settings.tolerance.max(HARMLESS));
         !is_solved && {
             let energy = self.measure_energy(true);
             self.exceeds(energy.held)

@@ -10,6 +10,7 @@ mod generalized_alpha;
 mod hard_limits;
 mod initial_guess;
 mod newton_factors;
+mod residual;
 mod rigid_fallback;
 mod twists;
 mod xpbd;

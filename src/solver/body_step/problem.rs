@@ -369,29 +369,4 @@ impl BodyProblem {
         self.accept_multipliers();
         std::mem::swap(&mut self.current, &mut self.trial);
     }
-
-    /// Largest component of `r + Jᵀλ` over the free nodes \[N\].
-    pub fn residual(&self) -> f64 {
-        let mut largest = 0.0_f64;
-        let mut pins = self.key.pins.iter().peekable();
-        for i in 0..self.current.r.len() {
-            if pins.next_if(|&&p| p as usize == i).is_some() {
-                continue;
-            }
-            let size = (self.current.r[i] + self.contact_force[i]).amax();
-            // NaN must not vanish in a maximum.
-            largest = if size.is_nan() { f64::INFINITY } else { largest.max(size) };
-        }
-        largest
-    }
-
-    pub fn has_converged(&self) -> bool {
-        self.residual() <= self.settings.tolerance.max(ROUNDING) * self.force_scale()
-    }
-
-    /// The force that residuals are measured by \[N\].
-    pub fn force_scale(&self) -> f64 {
-        let contact = self.contact_force.iter().map(|f| f.amax()).fold(0.0, f64::max);
-        self.weight.max(self.current.internal).max(contact)
-    }
 }
