@@ -19,6 +19,7 @@ impl StepScratch {
         deformables.reset_attachment_forces();
         for work in &mut self.islands {
             let finite = work.is_finite();
+            work.sort_contacts();
             for (local, &index) in work.members.iter().enumerate() {
                 let handle = self.works[index].handle;
                 let Some(body) = deformables.get_mut(handle) else { continue };

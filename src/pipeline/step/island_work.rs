@@ -1,7 +1,7 @@
 //! An island as the step keeps it: its solver's bodies and contacts, and which bodies of the step they are.
 
 use super::work::BodyWork;
-use crate::body::{ConstraintMemory, DeformableBodyHandle, DeformableState, is_number};
+use crate::body::{ConstraintKey, ConstraintMemory, DeformableBodyHandle, DeformableState, is_number};
 use crate::contact::{Constraint, Endpoint};
 use crate::solver::Island;
 
@@ -11,6 +11,8 @@ pub(super) struct IslandWork {
     pub island: Island,
     pub members: Vec<usize>,
     pub handles: Vec<DeformableBodyHandle>,
+    /// The contacts of the problem, ascending by key: names and places.
+    by_key: Vec<(ConstraintKey, usize)>,
 }
 
 impl IslandWork {
@@ -20,14 +22,12 @@ impl IslandWork {
         self.members.push(index);
         self.handles.push(work.handle);
         self.island.bodies.extend(work.problem.take());
-        for mut constraint in work.constraints.drain(..) {
-            for endpoint in &mut constraint.endpoints {
-                if let Endpoint::Soft { body, .. } = endpoint {
-                    *body = local;
-                }
+        for endpoint in work.constraints.iter_mut().flat_map(|constraint| &mut constraint.endpoints) {
+            if let Endpoint::Soft { body, .. } = endpoint {
+                *body = local;
             }
-            self.island.contacts.push(constraint);
         }
+        self.island.contacts.extend(work.constraints.drain(..));
     }
 
     /// Adds a constraint between members or proxies of the island: of what holds the latter, of
@@ -60,16 +60,23 @@ impl IslandWork {
         }
     }
 
-    /// What neighbourhood and attachments leave to the next step, ascending by key.
+    /// Sorts the contacts of the problem for what they leave to the next step. Names are sorted, not memories: those have 272 bytes.
+    pub fn sort_contacts(&mut self) {
+        let active = &self.island.contacts.active;
+        self.by_key.clear();
+        self.by_key.extend(active.iter().enumerate().map(|(place, contact)| (contact.constraint.key, place)));
+        self.by_key.sort_unstable();
+    }
+
+    /// What neighbourhood and attachments leave to the next step, ascending by key, once the contacts are sorted.
     pub fn memory_of_links(&self, h: f64, memory: &mut Vec<ConstraintMemory>) {
         memory.clear();
         let contacts = &self.island.contacts;
-        let links = contacts.active.iter().filter(|contact| contact.constraint.key.is_shared());
-        memory.extend(links.map(|contact| contacts.memory(contact, h)));
-        memory.sort_unstable_by_key(|m| m.key);
+        let links = self.by_key.iter().filter(|(key, _)| key.is_shared());
+        memory.extend(links.map(|(_, place)| contacts.memory(&contacts.active[*place], h)));
     }
 
-    /// What the contacts of a member leave to the next step, ascending by key.
+    /// What the contacts of a member leave to the next step, ascending by key, once they are sorted.
     pub fn memory_of(&self, member: usize, h: f64, memory: &mut Vec<ConstraintMemory>) {
         memory.clear();
         // What pushed a rigid shape says nothing of the next step.
@@ -77,10 +84,9 @@ impl IslandWork {
             return;
         }
         let contacts = &self.island.contacts;
-        let own = contacts.active.iter().filter(|contact| {
-            contact.constraint.endpoints[0].is_of(member) && !contact.constraint.key.is_shared()
-        });
+        let own = self.by_key.iter().filter(|(key, _)| !key.is_shared());
+        let own = own.map(|(_, place)| &contacts.active[*place]);
+        let own = own.filter(|contact| contact.constraint.endpoints[0].is_of(member));
         memory.extend(own.map(|contact| contacts.memory(contact, h)));
-        memory.sort_unstable_by_key(|m| m.key);
     }
 }

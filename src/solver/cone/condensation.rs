@@ -155,7 +155,7 @@ impl Condensation {
             if work.failures > 0 && effort != Effort::Full {
                 break;
             }
-            let change = self.finish(lambda, tolerance);
+            let Some(change) = self.finish(lambda, tolerance) else { break };
             full.multiply(lambda, W_lambda);
             if change <= tolerance.relative {
                 break;
@@ -221,9 +221,9 @@ impl Condensation {
         full.contacts() + 1 - self.problem.offsets.len()
     }
 
-    /// Brings what holds to where the contacts' forces have come to; not where both are as good as they were. Returns by how
-    /// much of the largest force it had to.
-    fn finish(&mut self, lambda: &mut [f64], tolerance: ConeTolerance) -> f64 {
+    /// Brings what holds to where the contacts' forces have come to. Returns by how much of the largest force it had to;
+    /// `None` where both are as good as they were, and not a bit has changed.
+    fn finish(&mut self, lambda: &mut [f64], tolerance: ConeTolerance) -> Option<f64> {
         let (holds, contacts) = lambda.split_at_mut(self.held);
         let changes = self.before.iter().zip(&*contacts).map(|(before, now)| before - now);
         self.x[self.held..].iter_mut().zip(changes).for_each(|(x, change)| *x = change);
@@ -234,8 +234,8 @@ impl Condensation {
             contacts.copy_from_slice(&self.before);
         } else if change > tolerance.good_enough() * scale || *contacts != self.before[..] {
             holds.iter_mut().zip(&self.x).for_each(|(force, change)| *force -= change);
-            return change / scale;
+            return Some(change / scale);
         }
-        0.0
+        None
     }
 }

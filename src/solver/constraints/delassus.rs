@@ -71,8 +71,10 @@ pub(crate) fn steady_geometry(constraint: &Constraint, proxies: &RigidProxies) -
             Endpoint::Rigid { .. } | Endpoint::Rotation { .. } => {}
         }
     }
-    let kept = constraint.warm_geometry.filter(|before| before.is_near(&now, POSITION_ROUNDING * farthest));
-    kept.unwrap_or(now)
+    match &constraint.warm_geometry {
+        Some(before) if before.is_near(&now, POSITION_ROUNDING * farthest) => *before,
+        _ => now,
+    }
 }
 
 impl Delassus {

@@ -138,6 +138,11 @@ impl ContactSystem {
         self.candidates.push(Candidate::new(constraint));
     }
 
+    /// Adds contacts of the step to come.
+    pub fn extend(&mut self, constraints: impl Iterator<Item = Constraint>) {
+        self.candidates.extend(constraints.map(Candidate::new));
+    }
+
     /// All contacts, those in the problem first.
     pub fn constraints(&self) -> impl Iterator<Item = &Constraint> + Clone {
         self.active.iter().map(|c| &c.constraint).chain(self.candidates.iter().map(|c| &c.constraint))
