@@ -71,11 +71,11 @@ impl ContactGroups {
         self.sorted.extend(names);
         self.sorted.sort_unstable();
         for first in 0..contacts.len() {
-            // Along the cycle of the permutation: what comes to `at` stays there.
+            // Along the cycle of the permutation: what comes to `at` stays there, and what is there already is a cycle of its own.
             let mut at = first;
             loop {
                 let from = std::mem::replace(&mut self.sorted[at].2, at);
-                if from == first || from == at {
+                if from == first {
                     break;
                 }
                 contacts.swap(at, from);
